@@ -1,9 +1,16 @@
 //! Impulses, or forces, of contacts at an instant: the problem and the memory for its solution.
 
+use super::solver::eliminate;
 use super::{
     solve, Certificate, Contact, ContactError, Effort, Mode, Problem, RestitutionLaw, Touch, Touching, WithContacts,
 };
 use crate::Scalar;
+
+/// Compliance of a contact among those that share a load, as a part of that by its inertia, and the number of times that
+/// what it gives way is taken back. Accelerations of closed contacts that it leaves are below rounding errors where the
+/// contacts that share a load are farther apart than a hundredth of the size of their bodies.
+const COMPLIANCE: f64 = 1e-4;
+const PASSES: u32 = 8;
 
 /// The contacts that take part, and memory for their impulses and forces.
 #[derive(Clone, Debug)]
@@ -142,6 +149,59 @@ impl<Y: Touching> Touches<Y> {
         let (problem, forces, work) = self.parts();
         forces.fill(Y::Scalar::zero());
         solve(&problem, effort, forces, work)
+    }
+
+    /// Forces of the closed contacts, in `impulses`, at the state that was looked at last, with the modes and directions of
+    /// slip as they are: they may be outside the cones. Contacts whose rows depend on one another share their load as
+    /// equally compliant ones would, in the limit of no compliance. `false` where there are no such forces.
+    pub fn share(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates) -> bool {
+        self.take_closed(system);
+        for i in 0..self.count {
+            let k = self.order()[i];
+            if system.modes()[k] == Mode::Slide {
+                self.problem.as_mut()[i].slip = Some(system.direction(k));
+            }
+        }
+        self.assemble(system, t, q);
+        self.free_accelerations(system, t, q);
+        self.impulses.as_mut().fill(Y::Scalar::zero());
+        (0..PASSES).all(|_| self.share_again())
+    }
+
+    /// Improves the forces of [`Touches::share`].
+    fn share_again(&mut self) -> bool {
+        let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
+        let more = Y::Scalar::constant(COMPLIANCE);
+        let n = self.rows();
+        let (a, b, forces) = (self.a.as_ref(), self.b.as_ref(), self.impulses.as_mut());
+        let (matrix, rest) = self.work.as_mut().split_at_mut(n * n);
+        let rhs = &mut rest[..n];
+        for Touch { contact: c, slip } in &self.problem.as_ref()[..self.count] {
+            for row in c.row..c.row + c.rows() {
+                let own = a[row * n + row];
+                let line = &mut matrix[row * n..(row + 1) * n];
+                line.fill(zero);
+                match slip {
+                    Some(slip) if row > c.row => {
+                        line[row] = one;
+                        line[c.row] = c.friction * slip[row - c.row - 1];
+                        rhs[row] = zero;
+                    }
+                    _ if own > zero => {
+                        for (x, a) in line.iter_mut().zip(&a[row * n..]) {
+                            *x = *a / own;
+                        }
+                        line[row] = one + more;
+                        rhs[row] = more * forces[row] - b[row] / own;
+                    }
+                    // What cannot move has no force.
+                    _ => (line[row], rhs[row]) = (one, zero),
+                }
+            }
+        }
+        let found = eliminate(&mut matrix[..n * n], rhs);
+        forces[..n].copy_from_slice(rhs);
+        found
     }
 
     /// Acceleration of a row, after [`Touches::find_forces`].

@@ -36,6 +36,8 @@ pub struct WithContacts<Y: Touching> {
     instant: Option<Touches<Y>>,
     /// Whether any contact slides with friction.
     rubs: bool,
+    /// Whether rows of closed contacts depend on one another.
+    pub(super) redundant: bool,
     pub(super) at: Contacts<Y>,
     /// Momenta of the state, freed of multipliers; the response to the friction of a contact.
     pub(super) p: Y::Momenta,
@@ -63,8 +65,6 @@ pub(super) struct Contacts<Y: Touching> {
     pub lambda: Y::Rows,
     /// Force of each contact `[normal, tangential, tangential]`, N: on the second body, the opposite on the first.
     pub forces: Y::PerContact<[Y::Scalar; 3]>,
-    /// Least pivot `1 − ∂N/∂N` of sliding contacts: at zero and below, friction wedges the contact (Painlevé).
-    pub wedge: Y::Scalar,
 }
 
 impl<Y: Touching> WithContacts<Y> {
@@ -81,6 +81,7 @@ impl<Y: Touching> WithContacts<Y> {
             begins: system.per_contact(false),
             instant: Some(Touches::new(&system)),
             rubs: false,
+            redundant: false,
             at: Contacts {
                 v: momenta(&system),
                 gaps: rows(&system),
@@ -88,7 +89,6 @@ impl<Y: Touching> WithContacts<Y> {
                 entries: system.zero_entries(),
                 lambda: rows(&system),
                 forces: system.per_contact([zero; 3]),
-                wedge: Y::Scalar::one(),
             },
             p: momenta(&system),
             response: momenta(&system),
@@ -144,6 +144,11 @@ impl<Y: Touching> WithContacts<Y> {
         self.rubs = (0..self.modes.as_ref().len()).any(|k| self.rubs(k));
     }
 
+    /// Whether contacts that slide with friction share a load.
+    pub(super) fn shares(&self) -> bool {
+        self.rubs && self.redundant
+    }
+
     /// Lets rows act as `modes` say, for a solve; [`WithContacts::restore`] ends this.
     pub(super) fn borrow_modes(&mut self, modes: &[Mode]) {
         self.system.act(modes);
@@ -195,9 +200,20 @@ impl<Y: Touching> WithContacts<Y> {
         }
     }
 
+    /// Speed of slip of contact `k`, m/s, after [`WithContacts::look`].
+    pub(super) fn speed(&self, k: usize) -> Y::Scalar {
+        let [x, y] = self.tangential(k);
+        (x * x + y * y).sqrt()
+    }
+
+    /// Whether contact `k` slides with friction, and does not just begin to.
+    pub(super) fn slides_on(&self, k: usize) -> bool {
+        self.rubs(k) && !self.begins.as_ref()[k]
+    }
+
     /// Direction of slip of contact `k` after [`WithContacts::look`]. Beyond the end of the motion along the direction
     /// where the step began, it is the mirror image: it does not jump within a step that leads too far.
-    fn direction(&self, k: usize) -> [Y::Scalar; 2] {
+    pub(super) fn direction(&self, k: usize) -> [Y::Scalar; 2] {
         if self.begins.as_ref()[k] {
             return self.slip.as_ref()[k];
         }
@@ -218,9 +234,8 @@ impl<Y: Touching> WithContacts<Y> {
         }
         self.look(t, q, p);
         for k in 0..self.modes.as_ref().len() {
-            let [x, y] = self.tangential(k);
             let begins = self.begins.as_ref()[k];
-            self.begins.as_mut()[k] = begins && !((x * x + y * y).sqrt().to_f64() > CREEP);
+            self.begins.as_mut()[k] = begins && !(self.speed(k).to_f64() > CREEP);
             if self.rubs(k) {
                 self.slip.as_mut()[k] = self.direction(k);
             }
@@ -289,7 +304,9 @@ impl<Y: Touching> WithContacts<Y> {
             self.begin(t, q);
         }
         self.friction.as_mut().fill(zero);
-        self.at.wedge = Y::Scalar::one();
+        if self.shares() && self.share(t, q) {
+            return;
+        }
         self.system.multipliers(t, q, &self.at.v, &mut self.at.lambda);
         let count = self.modes.as_ref().len();
         if self.rubs {
@@ -317,6 +334,27 @@ impl<Y: Touching> WithContacts<Y> {
             }
             self.at.forces.as_mut()[k] = force;
         }
+    }
+
+    /// [`WithContacts::loads`] where contacts that slide share a load; `false` where no forces are found.
+    fn share(&mut self, t: Y::Scalar, q: &Y::Coordinates) -> bool {
+        let Some(mut instant) = self.instant.take() else { return false };
+        let found = instant.share(self, t, q);
+        if found {
+            self.at.forces.as_mut().fill([Y::Scalar::zero(); 3]);
+            for (touch, &k) in instant.problem.as_ref().iter().zip(instant.order()) {
+                let c = self.contact(k);
+                for i in 0..c.rows() {
+                    let force = instant.impulses.as_ref()[touch.contact.row + i];
+                    self.at.forces.as_mut()[k][i] = force;
+                    if i > 0 && touch.slip.is_some() {
+                        add_row(&self.system, &self.at.entries, c.row + i, force, &mut self.friction);
+                    }
+                }
+            }
+        }
+        self.instant = Some(instant);
+        found
     }
 
     /// Multipliers of forces on the joints at rest, in `self.sigma`: of `self.unit`, or of all friction.
@@ -359,7 +397,7 @@ impl<Y: Touching> WithContacts<Y> {
         }
     }
 
-    /// Solves the system of [`WithContacts::normal_forces`] among the contacts that rub; notes the least pivot.
+    /// Solves the system of [`WithContacts::normal_forces`] among the contacts that rub.
     fn eliminate(&mut self, count: usize) {
         let width = count + 1;
         for k in 0..count {
@@ -367,9 +405,6 @@ impl<Y: Touching> WithContacts<Y> {
                 continue;
             }
             let pivot = self.table.as_ref()[k * width + k];
-            if pivot < self.at.wedge {
-                self.at.wedge = pivot;
-            }
             for j in 0..count {
                 if j == k || !self.rubs(j) {
                     continue;

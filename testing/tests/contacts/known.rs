@@ -191,8 +191,8 @@ fn random(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// Boxes that are thrown on the floor bounce, slide and come to rest. None of them falls through or gains energy, and what
-/// is not followed to its end is an error.
+/// Boxes that are thrown on the floor bounce, slide and come to rest. None of them falls through or gains energy. Gives the
+/// number of those that are not followed to their end.
 fn drops(count: usize) -> usize {
     let mut next = random(7);
     let mut failed = 0;
@@ -204,7 +204,7 @@ fn drops(count: usize) -> usize {
         let v: Vec<f64> = (0..6).map(|_| 2.0 * next()).collect();
         let mut scene = Scene::new(free_box(friction, restitution), &q, &v);
         scene.tolerance = 1e-8;
-        scene.steps = 1500;
+        scene.steps = 3000;
         let before = scene.energy();
         if let Err(error) = scene.try_run(2.0) {
             failed += 1;
@@ -223,17 +223,14 @@ fn drops(count: usize) -> usize {
 
 #[test]
 fn boxes_that_are_thrown_end_on_the_floor() {
-    let failed = drops(6);
-    assert!(failed <= 3, "{failed}");
+    assert_eq!(drops(12), 0);
 }
 
-/// Takes minutes.
+/// Takes a minute.
 #[test]
 #[ignore]
 fn many_boxes_that_are_thrown_end_on_the_floor() {
-    let failed = drops(100);
-    println!("{failed} of 100 are not followed to their end");
-    assert!(failed <= 40, "{failed}");
+    assert_eq!(drops(100), 0);
 }
 
 #[test]

@@ -3,12 +3,12 @@
 use super::watch::Found;
 use super::{Cause, Hybrid, HybridError};
 use crate::contact::{Touching, WithContacts};
-use crate::integrate::{Chart, Stepper};
-use crate::system::{Real, System};
+use crate::integrate::Stepper;
+use crate::system::Real;
 use crate::Scalar;
 
 /// Corrections of a landing.
-const CORRECTIONS: u32 = 4;
+const CORRECTIONS: u32 = 8;
 
 impl<Y, M> Hybrid<Y, M>
 where
@@ -22,7 +22,7 @@ where
         found: &Found<Y::Scalar>,
     ) -> Result<Y::Scalar, HybridError> {
         let (t, h) = self.solver.last_step();
-        let mut time = t + found.theta * h;
+        let (start, mut time) = (t, t + found.theta * h);
         if found.cause != Cause::Landed {
             if found.theta < Y::Scalar::one() {
                 self.solver.cut(system, found.theta)?;
@@ -31,16 +31,22 @@ where
             return Ok(self.solver.time());
         }
         self.step_to(system, time)?;
-        // What is left of the gap is an error of the dense output: the state is moved by its rates, forwards or back.
+        // What is left of the gap is an error of the dense output, or an overlap: the step ends a little sooner or later.
+        system.look(time, &self.q, &self.p);
+        let mut gap = system.gap(found.contact);
         for _ in 0..CORRECTIONS {
-            system.look(time, &self.q, &self.p);
-            let (gap, rate) = (system.gap(found.contact), system.gap_rate(found.contact));
-            let dt = -(gap / rate);
-            if time + dt == time || !(dt.abs() < h) {
+            let dt = -(gap / system.gap_rate(found.contact));
+            if time + dt == time || !(dt.abs() < h) || time + dt <= start {
                 break;
             }
-            self.shift(system, time, dt);
             time = time + dt;
+            self.step_to(system, time)?;
+            system.look(time, &self.q, &self.p);
+            let left = system.gap(found.contact);
+            if !(left.abs() < gap.abs()) {
+                break;
+            }
+            gap = left;
         }
         Ok(time)
     }
@@ -55,19 +61,5 @@ where
         done?;
         solver.state(system, q, p);
         Ok(())
-    }
-
-    /// Moves the state by its rates over a very short time.
-    fn shift(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, dt: Y::Scalar) {
-        let Hybrid { q, p, displacement, rates: (qd, pd), .. } = self;
-        system.rates_at(t, q, p, qd, pd);
-        system.look(t, q, p);
-        for (x, v) in displacement.as_mut().iter_mut().zip(system.at.v.as_ref()) {
-            *x = dt * *v;
-        }
-        Chart::displace(system, displacement, q);
-        for (p, rate) in p.as_mut().iter_mut().zip(pd.as_ref()) {
-            *p = *p + dt * *rate;
-        }
     }
 }

@@ -224,15 +224,13 @@ pub struct Hybrid<Y: Touching, M> {
     start: (Y::Scalar, Y::Coordinates, Y::Momenta),
     q: Y::Coordinates,
     p: Y::Momenta,
-    displacement: Y::Momenta,
-    rates: (Y::Coordinates, Y::Momenta),
     /// Watched functions at the ends of a stretch of a step.
     left: Y::PerContact<Watched<Y::Scalar>>,
     right: Y::PerContact<Watched<Y::Scalar>>,
     departures: Y::PerContact<Departure<Y::Scalar>>,
     touching: Touches<Y>,
-    /// Whether the forces of the closed contacts are not unique.
-    redundant: bool,
+    /// Modes before an event.
+    before: Y::PerContact<Mode>,
     /// Acceleration with which a contact falls back whose bounces have become too small, m/s² (rad/s²); zero without one.
     settling: Y::Scalar,
     /// Whether nothing can move.
@@ -273,13 +271,11 @@ where
             start: (t, q.clone(), p.clone()),
             q: q.clone(),
             p: p.clone(),
-            displacement: p.clone(),
-            rates: (q.clone(), p.clone()),
             left: inner.per_contact(Watched::zero()),
             right: inner.per_contact(Watched::zero()),
             departures: inner.per_contact(departure),
             touching: Touches::new(inner),
-            redundant: false,
+            before: inner.per_contact(Mode::Open),
             settling: zero,
             immobile: false,
             forced: None,

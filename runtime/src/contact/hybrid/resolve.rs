@@ -38,7 +38,7 @@ where
             rest: None,
         };
         system.look(t, &self.q, &self.p);
-        let own = !self.redundant || found.cause == Cause::Stopped;
+        let own = !system.redundant || system.shares() || found.cause == Cause::Stopped;
         self.forced = own.then(|| (found.contact, found.cause, system.at.forces.as_ref()[found.contact]));
         self.settle_modes(system, t, Some(&mut event))?;
         self.forced = None;
@@ -73,15 +73,13 @@ where
         let event = self.collide(system, t, event)?;
         self.stay(system, t, event.as_ref().map(|impact| impact.energy));
         self.select(system, t)?;
-        let changed = self.touching.modes.as_ref().iter().zip(system.modes()).filter(|(new, old)| new != old);
+        self.before.as_mut().copy_from_slice(system.modes());
+        self.take_modes(system, t);
+        let changed = self.before.as_ref().iter().zip(system.modes()).filter(|(old, new)| old != new);
         self.statistics.switches += changed.count() as u64;
-        system.set_modes(&self.touching);
-        system.look(t, &self.q, &self.p);
-        self.p.as_mut().copy_from_slice(system.p.as_ref());
         if !self.p.as_ref().iter().chain(self.q.as_ref()).all(|x| x.is_finite()) {
             return Err(HybridError::NotFinite { time: t.to_f64() });
         }
-        self.redundant = self.has_redundant_rows(system);
         self.evaluate(system, t, false);
         self.solver.limits.first_step = 0.0;
         self.solver.restart(system, t, &self.q, &self.p)?;
@@ -219,7 +217,7 @@ where
     }
 
     /// Whether rows of the closed contacts depend on one another; notes whether anything can move.
-    fn has_redundant_rows(&mut self, system: &mut WithContacts<Y>) -> bool {
+    pub(super) fn has_redundant_rows(&mut self, system: &mut WithContacts<Y>) -> bool {
         let rows = self.touching.rows();
         let a = self.touching.a.as_ref();
         let most =

@@ -9,6 +9,8 @@ use crate::Scalar;
 
 /// Part of the largest acceleration, or force, that counts as zero.
 const SMALL: f64 = 1e-9;
+/// Contacts stop together whose speeds of slip are below this many times the speed at which one stops.
+const TOGETHER: f64 = 10.0;
 
 impl<Y, M> Hybrid<Y, M>
 where
@@ -23,7 +25,6 @@ where
         self.touching.modes.as_mut().fill(Mode::Open);
         self.touching.slip.as_mut().fill([zero; 2]);
         self.touching.begins.as_mut().fill(false);
-        self.redundant = false;
         if self.touching.count == 0 {
             return Ok(());
         }
@@ -38,7 +39,9 @@ where
 
     /// Directions of contacts that slide.
     fn set_slips(&mut self, system: &WithContacts<Y>) {
-        let least = self.rules.slip;
+        // Where one contact stops, others that are about as slow do as well: the bodies come to rest.
+        let stops = self.forced.is_some_and(|(_, cause, _)| cause == Cause::Stopped);
+        let least = if stops { TOGETHER * self.rules.slip } else { self.rules.slip };
         for i in 0..self.touching.count {
             let k = self.touching.order()[i];
             let [x, y] = system.tangential(k);
@@ -93,6 +96,39 @@ where
             } else {
                 touching.modes.as_mut()[k] = Mode::Stick;
             }
+        }
+    }
+}
+
+impl<Y, M> Hybrid<Y, M>
+where
+    Y: Touching,
+    M: Stepper<WithContacts<Y>>,
+{
+    /// Sets the modes that were selected. Where contacts that slide share a load, those that would have to pull are opened:
+    /// the others hold them apart.
+    pub(super) fn take_modes(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar) {
+        let zero = Y::Scalar::zero();
+        loop {
+            system.set_modes(&self.touching);
+            system.look(t, &self.q, &self.p);
+            self.p.as_mut().copy_from_slice(system.p.as_ref());
+            system.redundant = self.has_redundant_rows(system);
+            if !system.shares() {
+                return;
+            }
+            system.look(t, &self.q, &self.p);
+            system.loads(t, &self.q, true);
+            let forces = system.at.forces.as_ref();
+            let largest = forces.iter().fold(zero, |most, [n, ..]| if *n > most { *n } else { most });
+            let closed = (0..forces.len()).filter(|k| system.modes()[*k] != Mode::Open);
+            let least = closed.fold(None, |least: Option<usize>, k| match least {
+                Some(other) if !(forces[k][0] < forces[other][0]) => Some(other),
+                _ => Some(k),
+            });
+            let Some(k) = least.filter(|k| forces[*k][0] <= Y::Scalar::constant(SMALL) * largest) else { return };
+            self.touching.modes.as_mut()[k] = Mode::Open;
+            self.touching.begins.as_mut()[k] = false;
         }
     }
 }

@@ -24,6 +24,8 @@ pub(super) struct Watched<S> {
     pub first: S,
     /// Rate of the gap of an open contact.
     pub rate: S,
+    /// Speed of slip of a contact that slides.
+    pub speed: S,
     /// Speed of slip along the direction where the step began; distance of the force from the friction cone.
     pub second: Option<S>,
 }
@@ -48,7 +50,7 @@ fn causes(mode: Mode) -> [Cause; 2] {
 
 impl<S: Real> Watched<S> {
     pub(super) fn zero() -> Self {
-        Watched { first: S::zero(), rate: S::zero(), second: None }
+        Watched { first: S::zero(), rate: S::zero(), speed: S::zero(), second: None }
     }
 
     fn value(&self, which: usize) -> Option<S> {
@@ -137,7 +139,21 @@ where
             core::mem::swap(&mut self.left, &mut self.right);
             from = to;
         }
-        self.overloaded(system)
+        match self.creeps(system) {
+            Some(contact) => Ok(Some(Found { contact, cause: Cause::Stopped, theta: one })),
+            None => self.overloaded(system),
+        }
+    }
+
+    /// The first contact that slides so slowly at the end of the step that friction may stop it there. Where bodies slide
+    /// and spin, the direction of slip turns ever faster as they come to rest, and steps shrink without end. After
+    /// [`Hybrid::first_event`] has evaluated the last stretch.
+    fn creeps(&self, system: &WithContacts<Y>) -> Option<usize> {
+        (0..self.count(system)).find(|&k| {
+            let [before, now] = [&self.right, &self.left].map(|at| at.as_ref()[k]);
+            let slow = now.speed.to_f64() < self.rules.slip && now.speed < before.speed;
+            slow && system.slides_on(k)
+        })
     }
 
     /// The event at which the forces of redundant contacts stop to be possible, if they have in the last step. Their
@@ -145,7 +161,7 @@ where
     /// not. So the forces are solved for wherever it does.
     fn overloaded(&mut self, system: &mut WithContacts<Y>) -> Result<Option<Found<Y::Scalar>>, HybridError> {
         let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
-        let Some(contact) = self.doubtful(system) else { return Ok(None) };
+        let Some(contact) = self.doubtful(system).filter(|_| !system.shares()) else { return Ok(None) };
         if core::mem::take(&mut self.unchanged) || self.holds_at(system, one)? {
             return Ok(None);
         }
@@ -210,7 +226,7 @@ where
         let (a, b) = (self.left.as_ref()[k], self.right.as_ref()[k]);
         let (at_a, at_b) = (a.value(which)?, b.value(which)?);
         let mode = system.modes()[k];
-        if self.redundant && mode != Mode::Open && !(mode == Mode::Slide && which == 1) {
+        if system.redundant && !system.shares() && mode != Mode::Open && !(mode == Mode::Slide && which == 1) {
             return None;
         }
         let cause = causes(mode)[which];
@@ -300,16 +316,16 @@ impl<Y: Touching> WithContacts<Y> {
             Mode::Open => Watched {
                 first: self.gap(k) + Y::Scalar::constant(OVERLAP[held]),
                 rate: self.gap_rate(k),
-                second: None,
+                ..Watched::zero()
             },
             Mode::Slide => {
                 let ([vx, vy], [a, b]) = (self.tangential(k), self.slip.as_ref()[k]);
                 let rubs = c.tangents && c.friction > zero;
-                Watched { first: normal, rate: zero, second: rubs.then_some(vx * a + vy * b) }
+                Watched { first: normal, rate: zero, speed: self.speed(k), second: rubs.then_some(vx * a + vy * b) }
             }
             Mode::Stick => {
                 let tangential = (x * x + y * y).sqrt();
-                Watched { first: normal, rate: zero, second: Some(c.friction * normal - tangential) }
+                Watched { first: normal, second: Some(c.friction * normal - tangential), ..Watched::zero() }
             }
         }
     }

@@ -20,6 +20,8 @@ mod tests;
 use super::Contact;
 use crate::system::Real;
 
+pub(super) use newton::eliminate;
+
 pub use impact::{impact, Impact, ImpactOptions, ImpactOrder};
 
 /// A contact of a problem.

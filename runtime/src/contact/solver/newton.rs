@@ -98,7 +98,7 @@ fn equations<S: Real>(terms: &Terms<S>, touch: &Touch<S>, impulses: &[S], matrix
 }
 
 /// Solves `matrix x = rhs` in place by Gaussian elimination with partial pivoting; `false` where a pivot is zero.
-fn eliminate<S: Real>(matrix: &mut [S], rhs: &mut [S]) -> bool {
+pub(in crate::contact) fn eliminate<S: Real>(matrix: &mut [S], rhs: &mut [S]) -> bool {
     let n = rhs.len();
     for k in 0..n {
         let size = |i: usize| matrix[i * n + k].abs();
