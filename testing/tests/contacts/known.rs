@@ -6,7 +6,15 @@ use mbd_runtime::contact::{Mode, RestitutionLaw};
 use super::scene::{model, Scene};
 
 /// A ball about a point of a body touches the floor.
-fn on_floor(model: &mut Model, name: &str, body: usize, xyz: [f64; 3], radius: f64, friction: f64, restitution: f64) {
+pub(super) fn on_floor(
+    model: &mut Model,
+    name: &str,
+    body: usize,
+    xyz: [f64; 3],
+    radius: f64,
+    friction: f64,
+    restitution: f64,
+) {
     let first = Mount { body: None, placement: Placement::IDENTITY };
     let second = Mount { body: Some(body), placement: Placement { xyz: xyz.map(Value::Const), ..Placement::IDENTITY } };
     let kind = LoopKind::RollingBall { normal: [0.0, 0.0, 1.0], radius: Value::Const(radius) };
@@ -21,7 +29,7 @@ fn on_floor(model: &mut Model, name: &str, body: usize, xyz: [f64; 3], radius: f
     });
 }
 
-fn ball(restitution: f64) -> Model {
+pub(super) fn ball(restitution: f64) -> Model {
     let mut model = model(
         r#"
 name = "ball"

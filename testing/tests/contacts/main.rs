@@ -1,4 +1,5 @@
 //! Motions with contacts against their known answers.
 
+mod answers;
 mod known;
 mod scene;

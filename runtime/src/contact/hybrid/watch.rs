@@ -9,6 +9,8 @@ use crate::Scalar;
 
 /// Number of stretches of a step at whose ends the functions are evaluated.
 const STRETCHES: u32 = 4;
+/// Speed of slip, m/s, below which bodies that slide ever more slowly may come to rest.
+const STANDSTILL: f64 = 1e-10;
 /// How often a stretch is halved in search of a point where a gap is positive, and another function.
 const HALVINGS: [u32; 2] = [40, 4];
 
@@ -151,7 +153,7 @@ where
     fn creeps(&self, system: &WithContacts<Y>) -> Option<usize> {
         (0..self.count(system)).find(|&k| {
             let [before, now] = [&self.right, &self.left].map(|at| at.as_ref()[k]);
-            let slow = now.speed.to_f64() < self.rules.slip && now.speed < before.speed;
+            let slow = now.speed.to_f64() < STANDSTILL && now.speed < before.speed;
             slow && system.slides_on(k)
         })
     }
