@@ -110,3 +110,8 @@ struct Guide;
 #[cfg(doctest)]
 #[doc = include_str!("../docs/constraints.md")]
 struct Constraints;
+
+/// And that of the page on contacts.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/contacts.md")]
+struct Contacts;

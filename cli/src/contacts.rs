@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
+use multibody::codegen::model::ConstraintKind;
 use multibody::codegen::plan::Plan;
 use multibody::runtime::catalogue::{self, BoxedMethod};
 use multibody::runtime::constrained::{Effort, Projection, WithPostStep};
@@ -164,11 +165,25 @@ fn cause(cause: Cause) -> &'static str {
     }
 }
 
-fn mode(mode: Mode) -> &'static str {
+/// What contact `k` does in a mode: where there is no friction, bodies that touch are just closed.
+fn mode(plan: &Plan, k: usize, mode: Mode) -> &'static str {
+    let rubs = plan.model.contacts.get(k).is_some_and(|c| c.friction > 0.0);
     match mode {
         Mode::Open => "open",
+        Mode::Slide if !rubs => "closed",
         Mode::Slide => "slides",
         Mode::Stick => "sticks",
+    }
+}
+
+/// Unit of the gap of contact `k`: that of its joint for a stop.
+fn unit(plan: &Plan, k: usize) -> &'static str {
+    match plan.model.contacts.get(k).map(|c| &c.kind) {
+        Some(ConstraintKind::Coupling { terms, .. }) => {
+            let joint = terms.first().and_then(|(joint, _)| plan.model.joints.get(*joint));
+            joint.and_then(|j| j.kind.spec().freedoms.first()).map_or("m", |f| f.unit.symbol())
+        }
+        _ => "m",
     }
 }
 
@@ -180,12 +195,12 @@ pub fn report(plan: &Plan, touched: &Touched, out: &mut dyn Write) -> Outcome {
     for event in events.iter().take(SHOWN) {
         let mut line = format!("  {:>12.9} s  {} {}", event.time, name(plan, event.contact), cause(event.cause));
         if event.impact.is_some() {
-            let _ = write!(line, " at {:.6} m/s", event.approach);
+            let _ = write!(line, " at {:.6} {}/s", event.approach, unit(plan, event.contact));
         }
         if let Some(rest) = event.rest {
             let _ = write!(line, ", bounces end at {rest:.9} s");
         }
-        writeln!(out, "{line}, then {}", mode(event.modes[1]))?;
+        writeln!(out, "{line}, then {}", mode(plan, event.contact, event.modes[1]))?;
     }
     if events.len() > SHOWN {
         writeln!(out, "  and {} more", events.len() - SHOWN)?;
@@ -193,7 +208,8 @@ pub fn report(plan: &Plan, touched: &Touched, out: &mut dyn Write) -> Outcome {
     if closed.is_empty() {
         writeln!(out, "contacts at the end: all open")?;
     } else {
-        let list: Vec<String> = closed.iter().map(|(k, m)| format!("{} {}", name(plan, *k), mode(*m))).collect();
+        let list: Vec<String> =
+            closed.iter().map(|(k, m)| format!("{} {}", name(plan, *k), mode(plan, *k, *m))).collect();
         writeln!(out, "contacts at the end: {}", list.join(", "))?;
     }
     let record = &touched.record;
@@ -221,7 +237,7 @@ pub fn table(plan: &Plan, events: &[ContactEvent<f64>]) -> String {
     let mut text = String::from("t,contact,event,mode,approach,energy\n");
     for event in events {
         let energy = event.impact.map_or(0.0, |impact| impact.energy);
-        let (what, then) = (cause(event.cause), mode(event.modes[1]));
+        let (what, then) = (cause(event.cause), mode(plan, event.contact, event.modes[1]));
         let _ = writeln!(
             text,
             "{},{},{what},{then},{},{energy}",
