@@ -40,7 +40,8 @@ where
     /// Directions of contacts that slide.
     fn set_slips(&mut self, system: &WithContacts<Y>) {
         // Where one contact stops, others that are about as slow do as well: the bodies come to rest.
-        let stops = self.forced.is_some_and(|(_, cause, _)| cause == Cause::Stopped);
+        let stops = |k: &usize| system.contact(*k).tangents && system.speed(*k).to_f64() < self.rules.slip;
+        let stops = self.touching.order().iter().any(stops);
         let least = if stops { TOGETHER * self.rules.slip } else { self.rules.slip };
         for i in 0..self.touching.count {
             let k = self.touching.order()[i];
