@@ -3,3 +3,4 @@
 mod answers;
 mod known;
 mod scene;
+mod walker;

@@ -52,24 +52,35 @@ impl Scene {
         self.try_run(t).unwrap();
     }
 
+    /// Starts the motion, if it has not begun.
+    pub fn start(&mut self) {
+        if self.motion.is_some() {
+            return;
+        }
+        let projection =
+            Projection::new(&self.system, Stabilisation::Mass, Effort { energy: f64::INFINITY, ..Effort::default() });
+        let method = WithPostStep::new(&self.system, Dop853::new(&self.system), projection);
+        let step = Step::Adaptive(Tolerances::new(self.tolerance));
+        let mut motion = Hybrid::new(&mut self.system, method, step, 0.0, &self.q, &self.p).unwrap();
+        motion.limits_mut().steps = self.steps;
+        self.motion = Some(motion);
+    }
+
     /// Goes on to time `t`, s, or to where the motion fails.
     pub fn try_run(&mut self, t: f64) -> Result<(), HybridError> {
-        let mut motion = self.motion.take().unwrap_or_else(|| {
-            let projection = Projection::new(
-                &self.system,
-                Stabilisation::Mass,
-                Effort { energy: f64::INFINITY, ..Effort::default() },
-            );
-            let method = WithPostStep::new(&self.system, Dop853::new(&self.system), projection);
-            let step = Step::Adaptive(Tolerances::new(self.tolerance));
-            let mut motion = Hybrid::new(&mut self.system, method, step, 0.0, &self.q, &self.p).unwrap();
-            motion.limits_mut().steps = self.steps;
-            motion
-        });
+        self.start();
+        let Some(motion) = &mut self.motion else { return Ok(()) };
         let result = motion.run(&mut self.system, t, &mut self.events);
         motion.state(&self.system, &mut self.q, &mut self.p);
-        self.motion = Some(motion);
         result
+    }
+
+    /// Takes one step, not beyond time `t`, s, or goes to the first event of that step.
+    pub fn advance(&mut self, t: f64) {
+        self.start();
+        let Some(motion) = &mut self.motion else { return };
+        motion.advance(&mut self.system, t, &mut self.events).unwrap();
+        motion.state(&self.system, &mut self.q, &mut self.p);
     }
 
     /// Velocities.

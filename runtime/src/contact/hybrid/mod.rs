@@ -229,6 +229,8 @@ pub struct Hybrid<Y: Touching, M> {
     right: Y::PerContact<Watched<Y::Scalar>>,
     departures: Y::PerContact<Departure<Y::Scalar>>,
     touching: Touches<Y>,
+    /// Contacts that are left open whatever their gaps are.
+    ignored: Y::PerContact<bool>,
     /// Modes before an event.
     before: Y::PerContact<Mode>,
     /// Acceleration with which a contact falls back whose bounces have become too small, m/s² (rad/s²); zero without one.
@@ -275,6 +277,7 @@ where
             right: inner.per_contact(Watched::zero()),
             departures: inner.per_contact(departure),
             touching: Touches::new(inner),
+            ignored: inner.per_contact(false),
             before: inner.per_contact(Mode::Open),
             settling: zero,
             immobile: false,
@@ -332,6 +335,14 @@ where
     /// What happened at the contacts so far.
     pub fn contact_statistics(&self) -> &ContactStatistics {
         &self.statistics
+    }
+
+    /// Leaves an open contact open from now on, whatever its gap is, or no longer: a foot that would have to be lifted may
+    /// pass the floor. A contact whose gap is negative when it is minded again is not noticed before it has opened.
+    pub fn ignore(&mut self, contact: usize, ignored: bool) {
+        if let Some(entry) = self.ignored.as_mut().get_mut(contact) {
+            *entry = ignored;
+        }
     }
 
     /// Limits of the work.

@@ -90,7 +90,7 @@ where
     fn take_touching(&mut self, system: &WithContacts<Y>) {
         self.touching.count = 0;
         for k in 0..self.count(system) {
-            let near = system.gap(k).to_f64() <= self.rules.touching;
+            let near = system.gap(k).to_f64() <= self.rules.touching && !self.ignored.as_ref()[k];
             if system.modes()[k] != Mode::Open || near {
                 self.touching.take(system, k);
             }

@@ -228,6 +228,9 @@ where
         let (a, b) = (self.left.as_ref()[k], self.right.as_ref()[k]);
         let (at_a, at_b) = (a.value(which)?, b.value(which)?);
         let mode = system.modes()[k];
+        if mode == Mode::Open && self.ignored.as_ref()[k] {
+            return None;
+        }
         if system.redundant && !system.shares() && mode != Mode::Open && !(mode == Mode::Slide && which == 1) {
             return None;
         }
