@@ -170,7 +170,7 @@ fn with_contacts(
     contacts::report(plan, &touched, out)?;
     writeln!(out, "work: {}", work(&record.statistics))?;
     let seconds = touched.seconds;
-    writeln!(out, "time: {seconds:.3} s, {:.0} times faster than time itself (interpreter)", args.time / seconds)?;
+    writeln!(out, "time: {seconds:.3} s, {} (interpreter)", pace(args.time / seconds))?;
     let (rows, count) = (record.t.len(), touched.events.len());
     writeln!(out, "table: {} ({rows} rows)\nevents: {} ({count} rows)", csv.display(), beside.display())?;
     writeln!(out, "plot: {}", svg.display())?;
@@ -285,6 +285,14 @@ fn singular(plan: &Plan, drift: &Drift) -> Option<String> {
     (*count > 0).then(|| text.replacen("{}", &told.join(", "), 1).replacen("{}", &more, 1))
 }
 
+/// How many times faster, or slower, than the motion it was computed.
+fn pace(factor: f64) -> String {
+    match factor < 1.0 {
+        true => format!("{:.1} times slower than time itself", 1.0 / factor),
+        false => format!("{factor:.0} times faster than time itself"),
+    }
+}
+
 /// Report of the computing times.
 fn spent(time: f64, spent: &Spent) -> String {
     let Spent { total, compiled, rates, derivatives, constraints, output, clock } = *spent;
@@ -303,9 +311,9 @@ fn spent(time: f64, spent: &Spent) -> String {
         None => "interpreter".to_string(),
     };
     format!(
-        "{total:.3} s, {:.0} times faster than time itself; rates {} ({by}){derivatives}{constraints}, the method's own sums {}, \
+        "{total:.3} s, {}; rates {} ({by}){derivatives}{constraints}, the method's own sums {}, \
          energies and rows {}",
-        time / total,
+        pace(time / total),
         share(rates),
         share(method),
         share(output)
