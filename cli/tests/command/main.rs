@@ -3,6 +3,7 @@
 mod c;
 mod certify;
 mod commands;
+mod contacts;
 mod documented;
 mod eval;
 mod loops;
