@@ -2,4 +2,5 @@
 
 mod answers;
 mod known;
+mod round;
 mod scene;
