@@ -278,6 +278,11 @@ pub enum Closure<S> {
         /// Radius, m.
         radius: S,
     },
+    /// A ball about the second origin rolls on a ball about the first.
+    RollingBalls {
+        /// Radii of the first and the second, m.
+        radii: [S; 2],
+    },
     /// No velocity of the second origin along z of the second frame.
     KnifeEdge,
     /// One linear condition on the relative motion.

@@ -31,7 +31,7 @@ pub struct LoopKnobs {
     /// Probability that a constraint couples joints.
     pub coupling: f64,
     /// Weights of the kinds of loops, in the order of [`LoopKind`].
-    pub kinds: [f64; 16],
+    pub kinds: [f64; 17],
     /// Probability that a constraint has a `decay`.
     pub decay: f64,
     /// Probability that a loop may leave its joints no motion.
@@ -48,7 +48,7 @@ impl LoopKnobs {
             ground: 0.6,
             twice: 0.0,
             coupling: 0.1,
-            kinds: [1.0; 16],
+            kinds: [1.0; 17],
             decay: 0.0,
             locked: 0.0,
         }
@@ -67,8 +67,8 @@ impl LoopKnobs {
             tree.massless = 0.0;
         }
         let few = rng.chance(0.4);
-        let kinds: [f64; 16] = std::array::from_fn(|_| if few && rng.chance(0.7) { 0.0 } else { 1.0 });
-        let kinds = if kinds.iter().all(|w| *w == 0.0) { [1.0; 16] } else { kinds };
+        let kinds: [f64; 17] = std::array::from_fn(|_| if few && rng.chance(0.7) { 0.0 } else { 1.0 });
+        let kinds = if kinds.iter().all(|w| *w == 0.0) { [1.0; 17] } else { kinds };
         LoopKnobs {
             tree,
             planar,
@@ -372,7 +372,8 @@ impl Closer<'_> {
             11 => LoopKind::PointOnCylinder { axis: self.direction(), radius: self.value(length) },
             12 => LoopKind::RollingDisc { normal: self.sideways(), axis: self.direction(), radius: self.value(length) },
             13 => LoopKind::RollingBall { normal: self.sideways(), radius: self.value(length) },
-            14 => LoopKind::KnifeEdge { axis: self.sideways() },
+            14 => LoopKind::RollingBalls { radii: [0.4, 0.6].map(|part| self.value(part * length)) },
+            15 => LoopKind::KnifeEdge { axis: self.sideways() },
             _ => {
                 let row: [f64; 6] = std::array::from_fn(|_| self.rng.around(1.0));
                 LoopKind::Pfaffian { row: row.map(|x| self.value(x)) }
@@ -427,6 +428,7 @@ impl Closer<'_> {
             LoopKind::RollingBall { normal, radius } => {
                 (self.any_turn(), add3(along(normal, num(radius)), level(self, normal)))
             }
+            LoopKind::RollingBalls { radii: [a, b] } => (self.any_turn(), along(self.sideways(), num(a) + num(b))),
             LoopKind::KnifeEdge { .. } | LoopKind::Pfaffian { .. } => {
                 let anywhere = self.direction();
                 (self.any_turn(), along(anywhere, slide))

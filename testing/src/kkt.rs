@@ -132,6 +132,7 @@ pub fn residuals<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Po
             vec![along(unit(normal)) - num(radius) * (S::one() - tilt * tilt).sqrt()]
         }
         LoopKind::RollingBall { normal, radius } => vec![along(unit(normal)) - num(radius)],
+        LoopKind::RollingBalls { radii: [p, q] } => vec![length(d) - num(p) - num(q)],
         LoopKind::KnifeEdge { .. } | LoopKind::Pfaffian { .. } => Vec::new(),
     }
 }
@@ -189,12 +190,24 @@ pub fn rates<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S
             let arm = scale3(-num(radius), a.direction(unit(normal)));
             contact(a, normal, add3(v, cross(w, arm)))
         }
+        LoopKind::RollingBalls { radii: [p, q] } => {
+            // The contact point divides the line between the middles as the radii do.
+            let share = num(q) / (num(p) + num(q));
+            meeting(d, add3(v, cross(w, scale3(-share, d))))
+        }
         LoopKind::KnifeEdge { axis } => vec![dot3(b.direction(unit(axis)), v)],
         LoopKind::Pfaffian { row } => {
             let [x, y, z, p, q, r] = row.map(num);
             vec![dot3(b.turn([x, y, z]), v) + dot3(b.turn([p, q, r]), w)]
         }
     }
+}
+
+/// Velocity of a contact point along a normal of any length, and that across it as three dependent rows.
+fn meeting<S: Scalar>(normal: Vec3<S>, v: Vec3<S>) -> Vec<S> {
+    let n = scale3(S::one() / dot3(normal, normal).sqrt(), normal);
+    let [x, y, z] = cross(n, v);
+    vec![dot3(n, v), x, y, z]
 }
 
 /// Velocity of a contact point along the normal and in two directions across it.

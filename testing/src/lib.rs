@@ -80,7 +80,7 @@ pub fn substituted(model: &Model, params: &[f64]) -> Model {
             ConstraintKind::Loop { kind, first, second } => {
                 placement(&mut first.placement);
                 placement(&mut second.placement);
-                kind.numbers_mut().iter_mut().for_each(of);
+                kind.numbers_mut().into_iter().for_each(of);
             }
         }
     }

@@ -4,7 +4,8 @@ use super::massless::{apply, matrix};
 use crate::model::{LoopKind, Mount, Placement, ShapeKind, Value};
 
 /// What [`elementary`] has, for messages.
-pub(super) const SUPPORTED: &str = "a `plane` can touch a `point`, `sphere`, `capsule`, `box` or `cylinder`";
+pub(super) const SUPPORTED: &str =
+    "a `plane` can touch a `point`, `sphere`, `capsule`, `box` or `cylinder`, a `sphere` a `point` or `sphere`";
 
 /// One place where two shapes can touch: a loop between two frames, which stand at these origins in the axes of the
 /// shapes, not turned.
@@ -35,6 +36,8 @@ pub(super) fn elementary(first: &ShapeKind, second: &ShapeKind) -> Option<Vec<El
             let kind = LoopKind::RollingDisc { normal, axis: [0.0, 0.0, 1.0], radius: Value::Const(radius) };
             ends(length).into_iter().map(|at| Elementary { kind, first: MIDDLE, second: at }).collect()
         }
+        (ShapeKind::Sphere { radius }, ShapeKind::Point) => vec![balls(radius, 0.0)],
+        (ShapeKind::Sphere { radius: first }, ShapeKind::Sphere { radius: second }) => vec![balls(first, second)],
         _ => return None,
     };
     Some(places)
@@ -44,6 +47,12 @@ pub(super) fn elementary(first: &ShapeKind, second: &ShapeKind) -> Option<Vec<El
 fn ball(normal: [f64; 3], radius: f64, second: [f64; 3]) -> Elementary {
     let kind = LoopKind::RollingBall { normal, radius: Value::Const(radius) };
     Elementary { kind, first: MIDDLE, second }
+}
+
+/// A ball about the middle of the second shape on one about the middle of the first.
+fn balls(first: f64, second: f64) -> Elementary {
+    let kind = LoopKind::RollingBalls { radii: [first, second].map(Value::Const) };
+    Elementary { kind, first: MIDDLE, second: MIDDLE }
 }
 
 /// The ends of a line of this length along z; one where it has none.
@@ -103,5 +112,10 @@ mod tests {
         assert_eq!(count(ShapeKind::Cylinder { radius, length }), Some(2));
         assert_eq!(count(ShapeKind::Cylinder { radius, length: 0.0 }), Some(1));
         assert_eq!(count(plane), None);
+        let sphere = ShapeKind::Sphere { radius };
+        let wide = ShapeKind::Sphere { radius: 0.3 };
+        assert_eq!(elementary(&sphere, &wide), Some(vec![balls(0.1, 0.3)]));
+        assert_eq!(elementary(&sphere, &ShapeKind::Point), Some(vec![balls(0.1, 0.0)]));
+        assert_eq!(elementary(&ShapeKind::Point, &ShapeKind::Point), None);
     }
 }

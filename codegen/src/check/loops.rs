@@ -7,8 +7,8 @@ use crate::import::raw::{RawConstraint, RawLoop, RawModel, RawNumber};
 use crate::import::source::{Findings, Span, Spanned};
 use crate::import::words::quote;
 use crate::model::{
-    Body, Constraint, ConstraintKind, Frame, Joint, JointMotion, LoopKind, LoopNumbers, LoopSpec, Mount, Placement,
-    Value, LOOPS,
+    Body, Constraint, ConstraintKind, Frame, Joint, JointMotion, LoopKind, LoopNumbers, LoopSpec, Mount, NumberKey,
+    Placement, Value, LOOPS,
 };
 use crate::rounded_once::norm;
 
@@ -68,7 +68,8 @@ fn entries(raw: &RawLoop, kind: &LoopSpec, what: &str, findings: &mut Findings) 
     let (name, allowed) = (kind.word(), kind.keys().collect::<Vec<_>>());
     let directions = raw.directions.iter().map(|(key, direction)| (*key, direction.span));
     let numbers = raw.numbers.iter().map(|(key, number)| (*key, number.span));
-    let present: Vec<_> = directions.chain(numbers).chain(raw.row.as_ref().map(|row| ("row", row.span))).collect();
+    let lists = raw.lists.iter().map(|(key, list)| (*key, list.span));
+    let present: Vec<_> = directions.chain(numbers).chain(lists).collect();
     for (key, span) in &present {
         if !allowed.contains(key) {
             findings.error(*span, format!("{what}: a {name} loop has no `{key}`"), instead(key, &allowed));
@@ -102,6 +103,7 @@ fn example(key: &str) -> Option<&'static str> {
         "pitch" => Some("`pitch = ..`, metres along the axis per radian (lead per turn / 2 pi)"),
         "length" => Some("`length = ..`, the distance of the two origins in metres"),
         "radius" => Some("`radius = ..`, in metres"),
+        "radii" => Some("`radii = [first, second]`, in metres"),
         "row" => Some("`row = [vx, vy, vz, wx, wy, wz]`, the factors of velocity and angular velocity"),
         _ => None,
     }
@@ -114,21 +116,38 @@ fn loop_kind(raw: &RawLoop, kind: &LoopSpec, what: &str, numbers: &mut Numbers) 
         let given = given.and_then(|d| numbers.direction(d, &format!("{what}: `{}`", direction.key)));
         *slot = given.unwrap_or(direction.default);
     }
-    let given = kind.number.and_then(|key| raw.number(key));
-    let number = match kind.number {
-        Some("pitch") => pitch(given, what, numbers),
-        Some("length") => {
-            let help = "the distance in metres, greater than 0; origins that coincide are a `spherical` loop";
-            positive(given, "length", help, what, numbers)
+    let mut values = [Value::ZERO; 6];
+    let mut slots = values.iter_mut();
+    for NumberKey { key, count } in kind.numbers {
+        let given: Vec<Option<&RawNumber>> = match count {
+            1 => vec![raw.number(key)],
+            _ => (0..*count).map(|k| raw.list(key).map(|list| &list.value[k])).collect(),
+        };
+        for (given, slot) in given.into_iter().zip(&mut slots) {
+            *slot = number(given, key, what, numbers);
         }
-        Some("radius") => positive(given, "radius", "a radius in metres, greater than 0", what, numbers),
-        _ => Value::ZERO,
-    };
-    let kind = (kind.make)(LoopNumbers { directions, number, row: row(raw, what, numbers) });
+    }
+    let kind = (kind.make)(LoopNumbers { directions, numbers: values });
+    if let (LoopKind::Pfaffian { row }, Some(at)) = (kind, raw.list("row")) {
+        not_all_zero(at.span, row, what, numbers);
+    }
     if let LoopKind::Universal { axes } = kind {
         right_angle(raw, axes, what, numbers.findings);
     }
     kind
+}
+
+/// One of the numbers under a key.
+fn number(raw: Option<&RawNumber>, key: &str, what: &str, numbers: &mut Numbers) -> Value {
+    match key {
+        "pitch" => pitch(raw, what, numbers),
+        "length" => {
+            let help = "the distance in metres, greater than 0; origins that coincide are a `spherical` loop";
+            positive(raw, key, help, what, numbers)
+        }
+        "row" => numbers.or_zero(raw, Quantity::Plain, &format!("{what}: `row`")),
+        _ => positive(raw, key, "a radius in metres, greater than 0", what, numbers),
+    }
 }
 
 /// Behind a value that only the default of a parameter gives.
@@ -157,14 +176,11 @@ fn pitch(raw: Option<&RawNumber>, what: &str, numbers: &mut Numbers) -> Value {
     value
 }
 
-fn row(raw: &RawLoop, what: &str, numbers: &mut Numbers) -> [Value; 6] {
-    let Some(at) = &raw.row else { return [Value::ZERO; 6] };
-    let row = [0, 1, 2, 3, 4, 5].map(|k| numbers.value(&at.value[k], Quantity::Plain, &format!("{what}: `row`")));
+fn not_all_zero(at: Span, row: [Value; 6], what: &str, numbers: &mut Numbers) {
     if row.iter().all(|x| numbers.at_default(*x) == 0.0) {
         let help = "write the factors of velocity and angular velocity: `[vx, vy, vz, wx, wy, wz]`, not all of them 0";
-        numbers.findings.error(at.span, format!("{what}: a `row` of zeros binds nothing"), help);
+        numbers.findings.error(at, format!("{what}: a `row` of zeros binds nothing"), help);
     }
-    row
 }
 
 fn right_angle(raw: &RawLoop, [a, b]: [[f64; 3]; 2], what: &str, findings: &mut Findings) {

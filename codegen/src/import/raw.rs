@@ -214,14 +214,20 @@ pub struct RawLoop {
     /// Numbers by their keys: a pitch (m/rad), a length or radius (m); the rate at which errors of the positions decay
     /// (1/s), 0 where there is none.
     pub numbers: Vec<(&'static str, RawNumber)>,
-    /// Coefficients of velocity and angular velocity.
-    pub row: Option<Spanned<[RawNumber; 6]>>,
+    /// Lists by their keys, each with as many numbers as belong there: radii (m), coefficients of velocity and angular
+    /// velocity.
+    pub lists: Vec<(&'static str, Spanned<Vec<RawNumber>>)>,
 }
 
 impl RawLoop {
     /// The number under a key.
     pub fn number(&self, key: &str) -> Option<&RawNumber> {
         self.numbers.iter().find(|(k, _)| *k == key).map(|(_, number)| number)
+    }
+
+    /// The list under a key.
+    pub fn list(&self, key: &str) -> Option<&Spanned<Vec<RawNumber>>> {
+        self.lists.iter().find(|(k, _)| *k == key).map(|(_, list)| list)
     }
 
     /// The direction under a key.

@@ -95,6 +95,11 @@ pub enum LoopKind {
         /// Radius, m.
         radius: Value,
     },
+    /// A ball about the second frame's origin rolls on a ball about the first frame's without slip.
+    RollingBalls {
+        /// Radii of the first and the second ball, m.
+        radii: [Value; 2],
+    },
     /// The second origin does not move along a direction fixed in the second frame.
     KnifeEdge {
         /// Direction across the edge.
@@ -137,10 +142,18 @@ pub struct Direction {
 pub struct LoopNumbers {
     /// Directions, as many as [`LoopSpec::directions`].
     pub directions: [[f64; 3]; 2],
-    /// Pitch (m/rad), length or radius (m), after [`LoopSpec::number`].
-    pub number: Value,
-    /// Coefficients of velocity and angular velocity.
-    pub row: [Value; 6],
+    /// Pitch (m/rad), lengths and radii (m), or coefficients of velocity and angular velocity, as many as
+    /// [`LoopSpec::numbers`] has and in their order.
+    pub numbers: [Value; 6],
+}
+
+/// A key of a loop for numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NumberKey {
+    /// Key in models.
+    pub key: &'static str,
+    /// How many numbers stand there: a list, if more than one.
+    pub count: usize,
 }
 
 /// The properties of a kind of loop.
@@ -151,8 +164,8 @@ pub struct LoopSpec {
     pub words: Words,
     /// Directions it takes.
     pub directions: &'static [Direction],
-    /// Key of the number it takes: `pitch`, `length`, `radius` or, for six of them, `row`.
-    pub number: Option<&'static str>,
+    /// Keys of the numbers it takes.
+    pub numbers: &'static [NumberKey],
     /// Units of the residuals of its rows.
     pub rows: &'static [Unit],
     /// Whether it constrains positions, whose errors can decay.
@@ -179,6 +192,10 @@ const fn normal(stands: Stands) -> Direction {
     direction("normal", stands)
 }
 
+const fn number(key: &'static str) -> NumberKey {
+    NumberKey { key, count: 1 }
+}
+
 /// Properties that a loop has in common with the joint of the same kind.
 const fn like(joint: &JointSpec) -> LoopSpec {
     LoopSpec { words: joint.words, ..PLAIN }
@@ -187,7 +204,7 @@ const fn like(joint: &JointSpec) -> LoopSpec {
 const PLAIN: LoopSpec = LoopSpec {
     words: FIXED.words,
     directions: &[],
-    number: None,
+    numbers: &[],
     rows: &[M],
     positions: true,
     make: |_| LoopKind::Fixed,
@@ -196,7 +213,7 @@ const PLAIN: LoopSpec = LoopSpec {
 use Stands::{InBoth, InFirst, InSecond};
 
 /// Every kind of loop, in the order of the variants of [`LoopKind`].
-pub static LOOPS: [LoopSpec; 16] = [
+pub static LOOPS: [LoopSpec; 17] = [
     LoopSpec {
         directions: &[axis(InBoth)],
         rows: &[M, M, M, RAD, RAD],
@@ -217,9 +234,9 @@ pub static LOOPS: [LoopSpec; 16] = [
     },
     LoopSpec {
         directions: &[axis(InBoth)],
-        number: Some("pitch"),
+        numbers: &[number("pitch")],
         rows: &[M, M, RAD, RAD, M],
-        make: |n| LoopKind::Helical { axis: n.directions[0], pitch: n.number },
+        make: |n| LoopKind::Helical { axis: n.directions[0], pitch: n.numbers[0] },
         ..like(&HELICAL)
     },
     LoopSpec {
@@ -241,8 +258,8 @@ pub static LOOPS: [LoopSpec; 16] = [
     LoopSpec { rows: &[M, M, M, RAD, RAD, RAD], make: |_| LoopKind::Fixed, ..like(&FIXED) },
     LoopSpec {
         words: Words::new("distance", &[], &["rod", "bar", "link"]),
-        number: Some("length"),
-        make: |n| LoopKind::Distance { length: n.number },
+        numbers: &[number("length")],
+        make: |n| LoopKind::Distance { length: n.numbers[0] },
         ..PLAIN
     },
     LoopSpec {
@@ -261,24 +278,31 @@ pub static LOOPS: [LoopSpec; 16] = [
     LoopSpec {
         words: Words::new("point_on_cylinder", &[], &[]),
         directions: &[axis(InFirst)],
-        number: Some("radius"),
-        make: |n| LoopKind::PointOnCylinder { axis: n.directions[0], radius: n.number },
+        numbers: &[number("radius")],
+        make: |n| LoopKind::PointOnCylinder { axis: n.directions[0], radius: n.numbers[0] },
         ..PLAIN
     },
     LoopSpec {
         words: Words::new("rolling_disc", &[], &["disc", "disk", "rolling_disk", "wheel"]),
         directions: &[normal(InFirst), axis(InSecond)],
-        number: Some("radius"),
+        numbers: &[number("radius")],
         rows: &[M, M, M],
-        make: |n| LoopKind::RollingDisc { normal: n.directions[0], axis: n.directions[1], radius: n.number },
+        make: |n| LoopKind::RollingDisc { normal: n.directions[0], axis: n.directions[1], radius: n.numbers[0] },
         ..PLAIN
     },
     LoopSpec {
         words: Words::new("rolling_ball", &[], &[]),
         directions: &[normal(InFirst)],
-        number: Some("radius"),
+        numbers: &[number("radius")],
         rows: &[M, M, M],
-        make: |n| LoopKind::RollingBall { normal: n.directions[0], radius: n.number },
+        make: |n| LoopKind::RollingBall { normal: n.directions[0], radius: n.numbers[0] },
+        ..PLAIN
+    },
+    LoopSpec {
+        words: Words::new("rolling_balls", &[], &[]),
+        numbers: &[NumberKey { key: "radii", count: 2 }],
+        rows: &[M, M, M],
+        make: |n| LoopKind::RollingBalls { radii: [n.numbers[0], n.numbers[1]] },
         ..PLAIN
     },
     LoopSpec {
@@ -290,9 +314,9 @@ pub static LOOPS: [LoopSpec; 16] = [
     },
     LoopSpec {
         words: Words::new("pfaffian", &[], &["nonholonomic"]),
-        number: Some("row"),
+        numbers: &[NumberKey { key: "row", count: 6 }],
         positions: false,
-        make: |n| LoopKind::Pfaffian { row: n.row },
+        make: |n| LoopKind::Pfaffian { row: n.numbers },
         ..PLAIN
     },
 ];
@@ -313,7 +337,7 @@ impl LoopSpec {
     /// Keys it has in models beside `name`, `type` and `between`.
     pub fn keys(&self) -> impl Iterator<Item = &'static str> {
         let decay = self.positions.then_some("decay");
-        self.directions.iter().map(|d| d.key).chain(self.number).chain(decay)
+        self.directions.iter().map(|d| d.key).chain(self.numbers.iter().map(|n| n.key)).chain(decay)
     }
 }
 
@@ -335,8 +359,9 @@ impl LoopKind {
             LoopKind::PointOnCylinder { .. } => 11,
             LoopKind::RollingDisc { .. } => 12,
             LoopKind::RollingBall { .. } => 13,
-            LoopKind::KnifeEdge { .. } => 14,
-            LoopKind::Pfaffian { .. } => 15,
+            LoopKind::RollingBalls { .. } => 14,
+            LoopKind::KnifeEdge { .. } => 15,
+            LoopKind::Pfaffian { .. } => 16,
         };
         &LOOPS[index]
     }
@@ -360,20 +385,25 @@ impl LoopKind {
             | LoopKind::RollingBall { normal: a, .. }
             | LoopKind::KnifeEdge { axis: a } => vec![a],
             LoopKind::Universal { axes: [a, b] } | LoopKind::RollingDisc { normal: a, axis: b, .. } => vec![a, b],
-            LoopKind::Spherical | LoopKind::Fixed | LoopKind::Distance { .. } | LoopKind::Pfaffian { .. } => Vec::new(),
+            LoopKind::Spherical
+            | LoopKind::Fixed
+            | LoopKind::Distance { .. }
+            | LoopKind::RollingBalls { .. }
+            | LoopKind::Pfaffian { .. } => Vec::new(),
         }
     }
 
-    /// The number it takes, or the six of a row.
-    pub fn numbers_mut(&mut self) -> &mut [Value] {
+    /// Its numbers, in the order of [`LoopSpec::numbers`].
+    pub fn numbers_mut(&mut self) -> Vec<&mut Value> {
         match self {
             LoopKind::Helical { pitch: x, .. }
             | LoopKind::Distance { length: x }
             | LoopKind::PointOnCylinder { radius: x, .. }
             | LoopKind::RollingDisc { radius: x, .. }
-            | LoopKind::RollingBall { radius: x, .. } => std::slice::from_mut(x),
-            LoopKind::Pfaffian { row } => row,
-            _ => &mut [],
+            | LoopKind::RollingBall { radius: x, .. } => vec![x],
+            LoopKind::RollingBalls { radii } => radii.iter_mut().collect(),
+            LoopKind::Pfaffian { row } => row.iter_mut().collect(),
+            _ => Vec::new(),
         }
     }
 
@@ -394,6 +424,7 @@ impl LoopKind {
             LoopKind::PointOnCylinder { radius, .. } => Closure::PointOnCylinder { radius },
             LoopKind::RollingDisc { radius, .. } => Closure::RollingDisc { radius },
             LoopKind::RollingBall { radius, .. } => Closure::RollingBall { radius },
+            LoopKind::RollingBalls { radii } => Closure::RollingBalls { radii },
             LoopKind::KnifeEdge { .. } => Closure::KnifeEdge,
             LoopKind::Pfaffian { row } => Closure::Pfaffian { row },
         }
@@ -457,12 +488,13 @@ mod tests {
 
     #[test]
     fn every_kind_is_listed_once_and_agrees_with_the_sweeps() {
-        let numbers = LoopNumbers { directions: [X, Y], number: Value::ONE, row: [Value::ONE; 6] };
+        let numbers = LoopNumbers { directions: [X, Y], numbers: [Value::ONE; 6] };
         for spec in &LOOPS {
             let mut kind = (spec.make)(numbers);
             assert_eq!(kind.spec(), spec);
             assert_eq!(kind.directions(), [X, Y][..spec.directions.len()], "{}", spec.word());
-            assert_eq!(kind.numbers_mut().is_empty(), spec.number.is_none(), "{}", spec.word());
+            let count = spec.numbers.iter().map(|n| n.count).sum();
+            assert_eq!(kind.numbers_mut().len(), count, "{}", spec.word());
             let closure = kind.closure();
             assert_eq!(closure.rows(), spec.rows.len(), "{}", spec.word());
             assert_eq!((0..closure.rows()).any(|k| closure.holonomic(k)), spec.positions, "{}", spec.word());

@@ -9,7 +9,9 @@ mod joint;
 use std::fmt;
 use std::sync::Arc;
 
-pub use constraint::{Constraint, ConstraintKind, Direction, LoopKind, LoopNumbers, LoopSpec, Mount, Stands, LOOPS};
+pub use constraint::{
+    Constraint, ConstraintKind, Direction, LoopKind, LoopNumbers, LoopSpec, Mount, NumberKey, Stands, LOOPS,
+};
 pub use contact::{Contact, Shape, ShapeKind, ShapeSpec, SHAPES};
 pub use joint::{Coordinate, Freedom, Joint, JointKind, JointMotion, JointSpec, JOINTS};
 pub(crate) use joint::{FIXED, FLOATING, PLANAR};

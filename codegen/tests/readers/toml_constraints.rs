@@ -27,7 +27,7 @@ fn parts(model: &Model, name: &str) -> (LoopKind, Mount, Mount) {
 fn constraints_come_in_file_order() {
     let names: Vec<String> = clean(ALL).constraints.into_iter().map(|c| c.name).collect();
     let all =
-        "close guide gears tubes screw shaft shaft_2 table socket weld rod rail floor pipe disc marble skate odd rack";
+        "close guide gears tubes screw shaft shaft_2 table socket weld rod rail floor pipe disc marble marbles skate odd rack";
     assert_eq!(names, all.split(' ').map(|n| n.replace("shaft_2", "shaft 2")).collect::<Vec<_>>());
 }
 
@@ -51,6 +51,7 @@ fn every_type_is_read() {
         ("pipe", LoopKind::PointOnCylinder { axis: [0.0, 0.0, -1.0], radius: C(0.25) }),
         ("disc", LoopKind::RollingDisc { normal: [0.0, 0.0, 3.0], axis: Y, radius: C(0.3) }),
         ("marble", LoopKind::RollingBall { normal: Z, radius: C(0.1) }),
+        ("marbles", LoopKind::RollingBalls { radii: [C(0.1), lead] }),
         ("skate", LoopKind::KnifeEdge { axis: Y }),
         ("odd", LoopKind::Pfaffian { row: [C(1.0), C(0.0), C(0.0), C(0.0), C(0.0), lead] }),
     ] {

@@ -21,6 +21,41 @@ fn at_point<S: Scalar>(n: Vec3<S>, r: Vec3<S>) -> Force<S> {
     Force { lin: n, ang: cross(r, n) }
 }
 
+/// Contact of two bodies that are balls about points, or what such balls cover when the points pass along segments.
+struct Touch<S> {
+    /// Distance of the surfaces, m.
+    gap: S,
+    /// Normal of both surfaces, towards the second body.
+    normal: Vec3<S>,
+    /// The contact point on the second body, from the origin of `B`, m.
+    at: Vec3<S>,
+}
+
+impl<S: Scalar> Touch<S> {
+    /// The contact of a ball about `middle`, from the origin of `B`, with another that is `apart` before it.
+    fn new(middle: Vec3<S>, apart: Vec3<S>, radii: &[S; 2]) -> Touch<S> {
+        // Points that coincide have no direction: the addend, far below the rounding of any other distance, gives zero.
+        let distance = (dot3(apart, apart) + S::constant(1e-36)).sqrt();
+        let normal = scale3(S::one() / distance, apart);
+        Touch { gap: distance - (radii[0] + radii[1]), normal, at: add3(middle, scale3(-radii[1], normal)) }
+    }
+}
+
+/// Two directions that form a right-handed triple of unit vectors with `n` in front: those of a constant triple in `A`
+/// after the shortest rotation that takes its third direction to `n`. That rotation is a smooth function of every `n`
+/// but the opposite direction, which is one that motions along the axes or planes of a frame do not meet.
+fn tangents<S: Scalar>(at: &Relative<S>, n: Vec3<S>) -> [Vec3<S>; 2] {
+    let direction = |x: [f64; 3]| at.turned(x.map(|x| S::constant(x / 7.0)));
+    let pole = direction([2.0, -3.0, 6.0]);
+    let sum = add3(pole, n);
+    // Next to the opposite direction itself, the triple is left as it is.
+    let factor = (S::one() + dot3(pole, n)).reciprocal_above(S::constant(1e-12));
+    [[6.0, -2.0, -3.0], [3.0, 6.0, 2.0]].map(|x| {
+        let x = direction(x);
+        add3(x, scale3(-(factor * dot3(x, n)), sum))
+    })
+}
+
 impl<S: Scalar> Relative<S> {
     /// Axis `k` of `A`.
     fn axis(&self, k: usize) -> Vec3<S> {
@@ -65,7 +100,11 @@ impl<S: Copy> Closure<S> {
             Closure::Fixed => 6,
             Closure::Revolute | Closure::Prismatic | Closure::Helical { .. } => 5,
             Closure::Cylindrical | Closure::Universal => 4,
-            Closure::Planar | Closure::Spherical | Closure::RollingDisc { .. } | Closure::RollingBall { .. } => 3,
+            Closure::Planar
+            | Closure::Spherical
+            | Closure::RollingDisc { .. }
+            | Closure::RollingBall { .. }
+            | Closure::RollingBalls { .. } => 3,
             Closure::PointOnLine => 2,
             Closure::Distance { .. }
             | Closure::PointOnPlane
@@ -78,7 +117,7 @@ impl<S: Copy> Closure<S> {
     /// Whether row `k` is the derivative of a condition on positions.
     pub fn holonomic(&self, k: usize) -> bool {
         match self {
-            Closure::RollingDisc { .. } | Closure::RollingBall { .. } => k == 0,
+            Closure::RollingDisc { .. } | Closure::RollingBall { .. } | Closure::RollingBalls { .. } => k == 0,
             Closure::KnifeEdge | Closure::Pfaffian { .. } => false,
             _ => true,
         }
@@ -115,6 +154,7 @@ impl<S: Scalar> Closure<S> {
                 | Closure::PointOnCylinder { .. }
                 | Closure::RollingDisc { .. }
                 | Closure::RollingBall { .. }
+                | Closure::RollingBalls { .. }
         )
     }
 
@@ -159,6 +199,13 @@ impl<S: Scalar> Closure<S> {
                     *row = at_point(at.axis(k), contact);
                 }
             }
+            Closure::RollingBalls { .. } => {
+                let touch = self.touch(at);
+                let tangents = tangents(at, touch.normal);
+                for (row, t) in rows.iter_mut().zip([touch.normal, tangents[0], tangents[1]]) {
+                    *row = at_point(t, touch.at);
+                }
+            }
             Closure::KnifeEdge => rows[0] = unit(2),
             Closure::Pfaffian { row: [fx, fy, fz, mx, my, mz] } => {
                 rows[0] = Force { lin: [*fx, *fy, *fz], ang: [*mx, *my, *mz] };
@@ -185,6 +232,14 @@ impl<S: Scalar> Closure<S> {
                 [down * n[0], down * n[1], S::zero()]
             }
             _ => [S::zero(); 3],
+        }
+    }
+
+    /// Contact of two rounded bodies.
+    fn touch(&self, at: &Relative<S>) -> Touch<S> {
+        match self {
+            Closure::RollingBalls { radii } => Touch::new([S::zero(); 3], at.d, radii),
+            _ => Touch::new([S::zero(); 3], at.d, &[S::zero(); 2]),
         }
     }
 
@@ -220,6 +275,7 @@ impl<S: Scalar> Closure<S> {
                 out[0] = half * (dot3(across, across) / *radius - *radius);
             }
             Closure::RollingDisc { .. } | Closure::RollingBall { .. } => out[0] = dot3(z, add3(d, self.contact(at))),
+            Closure::RollingBalls { .. } => out[0] = self.touch(at).gap,
             _ => {}
         }
         out

@@ -135,6 +135,7 @@ impl<S: Copy> Closure<S> {
             Closure::PointOnCylinder { radius } => Closure::PointOnCylinder { radius: of(radius) },
             Closure::RollingDisc { radius } => Closure::RollingDisc { radius: of(radius) },
             Closure::RollingBall { radius } => Closure::RollingBall { radius: of(radius) },
+            Closure::RollingBalls { radii } => Closure::RollingBalls { radii: radii.map(of) },
             Closure::KnifeEdge => Closure::KnifeEdge,
             Closure::Pfaffian { row } => Closure::Pfaffian { row: row.map(of) },
         }

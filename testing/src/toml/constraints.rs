@@ -1,6 +1,6 @@
 //! Writes loops, couplings and starts in the TOML format.
 
-use mbd_codegen::model::{Constraint, ConstraintKind, Joint, LoopKind, Mount, Placement, Start, Value};
+use mbd_codegen::model::{Constraint, ConstraintKind, Joint, LoopKind, Mount, NumberKey, Placement, Start, Value};
 
 use super::{line, quoted, turns, Writer};
 
@@ -75,10 +75,13 @@ impl Writer<'_> {
                 line(out, direction.key, format!("{value:?}"));
             }
         }
-        if let Some(key) = spec.number {
-            let value = match { *kind }.numbers_mut() {
-                [single] => self.number(*single, false),
-                row => self.list(row, false),
+        let mut kind = *kind;
+        let mut values = kind.numbers_mut().into_iter().map(|x| *x);
+        for NumberKey { key, count } in spec.numbers {
+            let list: Vec<Value> = values.by_ref().take(*count).collect();
+            let value = match list[..] {
+                [single] => self.number(single, false),
+                _ => self.list(&list, false),
             };
             line(out, key, value);
         }

@@ -14,7 +14,7 @@ use super::scene::{model, Mechanism, Scene};
 const G: f64 = 9.81;
 
 /// A scene of the models that are shipped, at the start that its file gives, with its loops closed.
-fn shipped(text: &str, v: &[f64]) -> Scene {
+pub(super) fn shipped(text: &str, v: &[f64]) -> Scene {
     let model = model(text);
     let plan = Plan::new(&model, 1e-9);
     let mut start = plan.start();
@@ -24,7 +24,7 @@ fn shipped(text: &str, v: &[f64]) -> Scene {
 }
 
 /// Complete elliptic integral of the first kind of modulus `k`, by the arithmetic-geometric mean.
-fn elliptic(k: f64) -> f64 {
+pub(super) fn elliptic(k: f64) -> f64 {
     let (mut a, mut b) = (1.0, (1.0 - k * k).sqrt());
     for _ in 0..30 {
         (a, b) = (0.5 * (a + b), (a * b).sqrt());

@@ -2,5 +2,6 @@
 
 mod answers;
 mod known;
+mod round;
 mod scene;
 mod walker;

@@ -5,7 +5,7 @@ use mbd_codegen::plan::Plan;
 use mbd_codegen::read;
 use mbd_runtime::constrained::{Effort, Projection, Stabilisation, WithPostStep};
 use mbd_runtime::contact::{
-    ContactEvent, ContactInterpreter, ContactObserver, Hybrid, HybridError, Touching, WithContacts,
+    ContactEvent, ContactInterpreter, ContactObserver, Hybrid, HybridError, ImpactOrder, Touching, WithContacts,
 };
 use mbd_runtime::integrate::{Dop853, Step, Tolerances};
 use mbd_runtime::{Conjugate, Constrained, Energetic};
@@ -22,6 +22,8 @@ pub struct Scene {
     pub q: Vec<f64>,
     pub p: Vec<f64>,
     pub tolerance: f64,
+    /// Order of simultaneous impacts.
+    pub order: ImpactOrder,
     /// Largest number of steps of a run.
     pub steps: u64,
 }
@@ -44,7 +46,8 @@ impl Scene {
         let mut p = v.to_vec();
         mechanism.conjugate_momenta(&q, &v.to_vec(), &mut p);
         let system = WithContacts::new(mechanism);
-        Scene { system, motion: None, events: Events::default(), q, p, tolerance: 1e-12, steps: u64::MAX }
+        let (events, order) = (Events::default(), ImpactOrder::default());
+        Scene { system, motion: None, events, q, p, tolerance: 1e-12, order, steps: u64::MAX }
     }
 
     /// Goes on to time `t`, s.
@@ -63,6 +66,7 @@ impl Scene {
         let step = Step::Adaptive(Tolerances::new(self.tolerance));
         let mut motion = Hybrid::new(&mut self.system, method, step, 0.0, &self.q, &self.p).unwrap();
         motion.limits_mut().steps = self.steps;
+        motion.rules.order = self.order;
         self.motion = Some(motion);
     }
 

@@ -73,7 +73,7 @@ fn loop_kind(model: &Model, rng: &mut Rng) -> LoopKind {
     let axis = rng.pick(&[[0.0, 0.0, 1.0], axis]);
     let square = rng.pick(&[[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0.0, 0.0, 1.0], [3.0, -1.0, 0.0]]]);
     let size = value(model, rng, 0.1, 1.0);
-    match rng.below(16) {
+    match rng.below(17) {
         0 => LoopKind::Revolute { axis },
         1 => LoopKind::Prismatic { axis },
         2 => LoopKind::Cylindrical { axis },
@@ -88,7 +88,8 @@ fn loop_kind(model: &Model, rng: &mut Rng) -> LoopKind {
         11 => LoopKind::PointOnCylinder { axis, radius: size },
         12 => LoopKind::RollingDisc { normal, axis, radius: size },
         13 => LoopKind::RollingBall { normal, radius: size },
-        14 => LoopKind::KnifeEdge { axis },
+        14 => LoopKind::RollingBalls { radii: [size, value(model, rng, 0.1, 1.0)] },
+        15 => LoopKind::KnifeEdge { axis },
         _ => LoopKind::Pfaffian { row: [Value::ONE, Value::ZERO, size, Value::ZERO, Value::ZERO, size] },
     }
 }

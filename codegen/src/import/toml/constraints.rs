@@ -8,7 +8,7 @@ use super::super::words::quote;
 use super::kinds::kind;
 use super::numbers::{self, Unit};
 use super::table::Table;
-use crate::model::{LoopSpec, Unit as Measures, FLOATING, LOOPS};
+use crate::model::{LoopSpec, NumberKey, Unit as Measures, FLOATING, LOOPS};
 
 const COUPLING: &[&str] = &["name", "joints", "ratios", "offset", "decay"];
 
@@ -33,21 +33,23 @@ pub(super) fn all(top: &Table, raw: &mut RawModel, findings: &mut Findings) {
 
 fn one_loop(table: &Table, findings: &mut Findings) -> Option<RawLoop> {
     let directions = distinct(LOOPS.iter().flat_map(|spec| spec.directions.iter().map(|d| d.key)));
-    let numbers = distinct(LOOPS.iter().filter_map(|spec| spec.number));
-    let keys = [&["name", "type", "between"], &directions[..], &numbers[..], &["decay"]].concat();
+    let numbers = distinct(LOOPS.iter().flat_map(|spec| spec.numbers.iter().copied()));
+    let named: Vec<&str> = numbers.iter().map(|n| n.key).collect();
+    let keys = [&["name", "type", "between"], &directions[..], &named[..], &["decay"]].concat();
     table.reject_unknown(&keys, "a loop", findings);
     let name = table.required_text("name", findings);
     let kind = loop_type(table, findings);
     let between = between(table, "bodies, frames or `ground`", findings);
     let directions = directions.into_iter().filter_map(|key| Some((key, table.direction(key, findings)?))).collect();
-    let row = row(table, findings);
-    let single = numbers.into_iter().filter(|key| *key != "row").chain(["decay"]);
+    let several = numbers.iter().filter(|n| n.count > 1);
+    let lists = several.filter_map(|n| Some((n.key, list(table, *n, findings)?))).collect();
+    let single = numbers.iter().filter(|n| n.count == 1).map(|n| n.key).chain(["decay"]);
     let numbers = single.filter_map(|key| Some((key, table.number(key, Unit::Plain, findings)?))).collect();
-    Some(RawLoop { name: name?, kind, between, directions, numbers, row })
+    Some(RawLoop { name: name?, kind, between, directions, numbers, lists })
 }
 
 /// Each key once, in the order of the first.
-fn distinct(keys: impl Iterator<Item = &'static str>) -> Vec<&'static str> {
+fn distinct<K: PartialEq>(keys: impl Iterator<Item = K>) -> Vec<K> {
     let mut list = Vec::new();
     for key in keys {
         if !list.contains(&key) {
@@ -85,22 +87,29 @@ pub(super) fn between(table: &Table, ends: &str, findings: &mut Findings) -> Opt
         .ok()
 }
 
-/// Six numbers; invalid ones where something else is there.
-fn row(table: &Table, findings: &mut Findings) -> Option<Spanned<[RawNumber; 6]>> {
-    let value = table.raw("row")?;
+/// As many numbers as belong under a key; invalid ones where something else is there.
+fn list(
+    table: &Table,
+    NumberKey { key, count }: NumberKey,
+    findings: &mut Findings,
+) -> Option<Spanned<Vec<RawNumber>>> {
+    let value = table.raw(key)?;
     let span = value.span();
-    let what = format!("{}`row`", table.prefix());
-    let six = numbers::numbers(value, &[Unit::Plain], &what, findings).and_then(|list| {
-        let count = list.len();
-        let six = <[RawNumber; 6]>::try_from(list).ok();
-        if six.is_none() {
-            let help = "write the factors of velocity and angular velocity: `[vx, vy, vz, wx, wy, wz]`";
-            findings.error(span.clone().into(), format!("{what} needs 6 numbers and has {count}"), help);
+    let what = format!("{}`{key}`", table.prefix());
+    let list = numbers::numbers(value, &[Unit::Plain], &what, findings).filter(|list| {
+        let right = list.len() == count;
+        if !right {
+            let help = match key {
+                "row" => "write the factors of velocity and angular velocity: `[vx, vy, vz, wx, wy, wz]`",
+                _ => "write one for the first of the two that `between` names and one for the second",
+            };
+            let message = format!("{what} needs {count} numbers and has {}", list.len());
+            findings.error(span.clone().into(), message, help);
         }
-        six
+        right
     });
-    let invalid = || [0; 6].map(|_| Spanned::new(RawValue::Invalid, span.clone()));
-    Some(Spanned::new(six.unwrap_or_else(invalid), span.clone()))
+    let invalid = || vec![Spanned::new(RawValue::Invalid, span.clone()); count];
+    Some(Spanned::new(list.unwrap_or_else(invalid), span.clone()))
 }
 
 fn coupling(table: &Table, lengths: &HashSet<&str>, findings: &mut Findings) -> Option<RawCoupling> {

@@ -28,7 +28,7 @@ pub fn system(seed: u64) -> LoopSystem {
         0 => random_loops(seed, &LoopKnobs::plain()),
         // In a plane, only two or three rows of each joint that closes a loop are independent.
         1 => {
-            let kinds = [3.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.5, 0.0, 0.5, 0.0];
+            let kinds = [3.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.5, 0.0, 0.5, 0.5, 0.0];
             let tree = Distribution {
                 bodies: (3, 8),
                 branching: 0.3,
