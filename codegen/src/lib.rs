@@ -26,6 +26,7 @@ mod sample;
 pub mod search;
 pub mod symbolic;
 mod trace;
+pub mod transfer;
 #[cfg(feature = "wasm")]
 pub mod wasm;
 

@@ -21,6 +21,7 @@ impl Plan {
         let contact_frames = loops.split_off(model.constraints.len());
         let mut plan = Plan {
             model: model.clone(),
+            snap,
             nodes: framed.nodes,
             dims: Dims { wrenches: model.wrenches.len(), ..dims },
             unknowns: Vec::new(),

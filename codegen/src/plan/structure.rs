@@ -102,6 +102,8 @@ impl Slot {
 pub struct Plan {
     /// The model it was made from.
     pub model: Model,
+    /// Angles closer than this to right angles were made exact, rad.
+    pub snap: f64,
     /// Nodes, parents first.
     pub nodes: Vec<PlanNode>,
     /// Dimensions.
