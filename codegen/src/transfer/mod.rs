@@ -326,7 +326,8 @@ impl Transfer {
             // |R − R'| = 2√2 sin(θ/2) for two rotations θ apart.
             let angle = 2.0 * libm::asin((turned / 8.0_f64.sqrt()).min(1.0));
             let size = (length / self.fit.length).max(angle / self.fit.angle);
-            if !(length <= self.fit.length && angle <= self.fit.angle) {
+            // What is not a number does not fit.
+            if size.is_nan() || length.is_nan() || length > self.fit.length || angle > self.fit.angle {
                 return Err(TransferError::Position { joint: joint.name.clone(), length, angle });
             }
             if size > worst {
@@ -341,8 +342,10 @@ impl Transfer {
         let (mut residual, mut entries) = (to.zero_rows(), to.zero_entries());
         to.constraint_residuals(q, &mut residual, &mut entries);
         let allowed = self.fit.length.min(self.fit.angle);
-        let open = |(row, x): (&mbd_runtime::system::Row, &f64)| (!(x.abs() <= allowed)).then_some(row.constraint);
-        let Some(worst) = to.rows().iter().zip(&residual).find_map(open) else { return Ok(()) };
+        // A residual that is not a number is open.
+        let open = |x: f64| x.is_nan() || x.abs() > allowed;
+        let mut rows = to.rows().iter().zip(&residual);
+        let Some(worst) = rows.find_map(|(row, x)| open(*x).then_some(row.constraint)) else { return Ok(()) };
         let rows = to.rows().iter().zip(&residual).filter(|(row, _)| row.constraint == worst);
         let residual = rows.map(|(_, x)| x.abs()).fold(0.0, f64::max);
         Err(TransferError::Open { constraint: self.constraints.get(worst).cloned().unwrap_or_default(), residual })
