@@ -5,22 +5,24 @@ use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
+use multibody::codegen::jit::Compiled;
 use multibody::codegen::model::ConstraintKind;
 use multibody::codegen::plan::Plan;
+use multibody::codegen::{Arithmetic, Options};
 use multibody::runtime::catalogue::{self, BoxedMethod};
 use multibody::runtime::constrained::{Effort, Projection, WithPostStep};
 use multibody::runtime::contact::{
-    Cause, ContactEvent, ContactInterpreter, ContactObserver, ContactStatistics, Hybrid, HybridError, Mode, Stretch,
+    Cause, ContactEvent, ContactObserver, ContactStatistics, Hybrid, HybridError, Mode, ModeTable, Stretch,
     WithContacts,
 };
 use multibody::runtime::integrate::Statistics;
 use multibody::runtime::Conjugate;
 
-use super::motion::{Record, Settings};
+use super::motion::{set_gravity, Record, Settings};
 use super::{Failure, Outcome};
 
-/// A mechanism with contacts in the interpreter.
-type Mechanism = ContactInterpreter<f64>;
+/// A mechanism with contacts: machine code for the modes that a motion stays in, the interpreter for the others.
+type Mechanism = ModeTable<Compiled>;
 type System = WithContacts<Mechanism>;
 
 /// Number of events that are printed.
@@ -109,10 +111,21 @@ fn method(settings: &Settings, system: &System) -> Outcome<BoxedMethod<'static, 
     Ok(Box::new(WithPostStep::new(system, method, Projection::new(system, settings.hold, effort))))
 }
 
+/// A mechanism with contacts, in exact arithmetic, so that machine code gives the bits of the interpreter.
+fn mechanism(plan: &Plan, interpreted: bool) -> Outcome<Mechanism> {
+    let options = Options { arithmetic: Arithmetic::Exact, ..Options::default() };
+    let calls = if interpreted { u32::MAX } else { Compiled::<f64>::WORTHWHILE };
+    let mut mechanism = plan
+        .compiled_with_contacts(&options, calls)
+        .map_err(|e| Failure::new(e.to_string(), "simulate with --interpreted"))?;
+    set_gravity(plan, mechanism.inputs());
+    Ok(mechanism)
+}
+
 /// Simulates from given coordinates and velocities.
 pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) -> Outcome<Touched> {
-    let mut mechanism: Mechanism = plan.default_contact_interpreter();
-    mechanism.check_rank(&q).map_err(|e| super::source::rank_failure(&e))?;
+    let mut mechanism = mechanism(plan, settings.interpreted)?;
+    mechanism.inputs().check_rank(&q).map_err(|e| super::source::rank_failure(&e))?;
     let mut p = v.clone();
     mechanism.conjugate_momenta(&q, &v, &mut p);
     let mut system = WithContacts::new(mechanism);

@@ -203,7 +203,7 @@ impl PostStep<Timed> for Keeper {
 }
 
 /// Gives gravity that is an input the default value of the field in generated code.
-fn set_gravity<S: Scalar>(plan: &Plan, interpreter: &mut Interpreter<S>) {
+pub fn set_gravity<S: Scalar>(plan: &Plan, interpreter: &mut Interpreter<S>) {
     if plan.model.gravity == Gravity::Input {
         interpreter.gravity = [0.0, 0.0, -9.81].map(S::constant);
     }

@@ -27,6 +27,13 @@ pub enum GenerateError {
         /// Name of the model.
         model: String,
     },
+    /// The output is one of mechanisms with contacts, in code for their modes.
+    OutputNeedsContacts {
+        /// The output.
+        output: Output,
+        /// Name of the model.
+        model: String,
+    },
     /// A number in the code is infinite: a freedom has no inertia, which the checks of the model cannot see where
     /// parameters are involved.
     InfiniteNumber {
@@ -54,6 +61,10 @@ impl fmt::Display for GenerateError {
             GenerateError::OutputLacksConstraints { output, model } => {
                 let name = output.name();
                 write!(f, "`{name}` does not know the loops and couplings of `{model}`: use `derivatives`")
+            }
+            GenerateError::OutputNeedsContacts { output, model } => {
+                let name = output.name();
+                write!(f, "`{name}` is an output of mechanisms with contacts, of code for their modes (option `modes`), and this is not such code of `{model}`")
             }
             GenerateError::InfiniteNumber { output, body: Some(body) } => {
                 write!(f, "`{}` contains an infinite number at body `{body}`: {question}", output.name())

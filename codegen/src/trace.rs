@@ -37,7 +37,10 @@ pub fn chosen_frames(plan: &Plan, options: &Options) -> Result<Vec<usize>, Gener
 fn check_availability(plan: &Plan, output: Output) -> Result<(), GenerateError> {
     let model = || plan.model.name.clone();
     match output.spec().availability {
-        _ if output.spec().available(!plan.constraints.is_empty()) => Ok(()),
+        // Where some rows act, or none, there are the outputs of plans with rows.
+        _ if output.spec().available(plan.dims.rows > 0) => Ok(()),
+        Availability::WithContacts if plan.has_contacts() => Ok(()),
+        Availability::WithContacts => Err(GenerateError::OutputNeedsContacts { output, model: model() }),
         Availability::WithoutConstraints => Err(GenerateError::OutputLacksConstraints { output, model: model() }),
         _ => Err(GenerateError::OutputNeedsConstraints { output, model: model() }),
     }
@@ -72,6 +75,9 @@ pub fn trace(plan: &Plan, output: Output, options: &Options) -> Result<OutputPro
     let given = SymbolicInputs::new(&graph, plan, spec, options);
     let mut physical: Tree<Expr> = plan.tree(&given.params);
     physical.tolerance = Expr::Const(tolerance(options.precision));
+    if !given.acts.is_empty() {
+        physical = physical.with_row_factors(given.acts.clone());
+    }
     let tree = physical.regrouped();
     let run = Run { graph: &graph, plan, tree: &tree, physical: &physical, given: &given, frames: &frames };
     let mut results: Vec<Vec<Expr>> = spec.results.iter().map(|a| vec![Expr::zero(); a.len(&sizes)]).collect();
@@ -179,6 +185,7 @@ impl<'g> Run<'_, 'g> {
             (Output::ConstraintResiduals, [phi, entries]) => sweeps.constraint_residuals(q, u, w, phi, entries),
             (Output::ProjectMomenta, [v, freed, sigma]) => sweeps.project_momenta(q, second, u, w, v, freed, sigma),
             (Output::PositionCorrection, [phi, dq, pivots]) => sweeps.position_correction(q, u, w, phi, dq, pivots),
+            (Output::Gaps, [gaps, velocities, entries]) => sweeps.gaps(q, second, u, w, [gaps, velocities, entries]),
             (Output::Multipliers, [lambda]) => other.multipliers(q, second, u, w, v, lambda),
             _ => unreachable!("results are those of the table"),
         }

@@ -141,11 +141,11 @@ impl<S: Scalar> Interpreter<S> {
         swap(&mut self.gravity, &mut other.gravity);
     }
 
-    /// Velocities of the rows of the constraints, `(q, v) → Φ v` with what prescribed motions add, one number for each
-    /// row.
-    pub fn row_velocities(&mut self, q: &[S], v: &[S], out: &mut [S]) {
+    /// Residuals of all rows of the constraints, their velocities `Φ v` with what prescribed motions add, one number for
+    /// each row, and the entries of `Φ`: `(q, v) → (φ, Φ v, Φ)`.
+    pub fn gaps(&mut self, q: &[S], v: &[S], gaps: &mut [S], velocities: &mut [S], entries: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.row_velocities(q, v, &inputs!(self), &mut self.work, out);
+        sweeps.gaps(q, v, &inputs!(self), &mut self.work, [gaps, velocities, entries]);
     }
 
     /// Takes the names of the velocities and of the constraints, in their order, for the messages of errors.

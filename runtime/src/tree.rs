@@ -360,6 +360,10 @@ pub struct Tree<S> {
     pub constraints: Vec<Constraint<S>>,
     /// Fraction of a row's diagonal entry of `Φ M⁻¹Φᵀ`; a row of which less remains counts as redundant.
     pub tolerance: S,
+    /// One factor for each row of the constraints, where rows act or not by numbers: 1 for a row that acts, 0 for one
+    /// that does not. All act where there are none. Rows that do not act have no multipliers, and no pivots; a
+    /// constraint whose first row does not act has no residuals and entries either.
+    pub row_factors: Option<Vec<S>>,
     /// Frames of interest: first that of every joint's child body, in joint order, then the others.
     pub frames: Vec<TreeFrame<S>>,
     /// Joint of each leading frame: node whose transmitted wrench is the joint's reaction.
@@ -406,6 +410,18 @@ impl<S> Tree<S> {
         self.solve_at_ground.retain(|&g| !silent(g));
         self.constraints.retain(|c| acts[rows(c)].contains(&true));
         self.accelerations = self.accelerations.map(|tree| alloc::boxed::Box::new(tree.acting(acts)));
+        self
+    }
+
+    /// The same mechanism in which [rows act by numbers](Tree::row_factors): one factor for each row.
+    #[must_use]
+    pub fn with_row_factors(mut self, factors: Vec<S>) -> Tree<S>
+    where
+        S: Clone,
+    {
+        self.accelerations =
+            self.accelerations.map(|tree| alloc::boxed::Box::new(tree.with_row_factors(factors.clone())));
+        self.row_factors = Some(factors);
         self
     }
 

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use mbd_codegen::generate::InputArray;
 use mbd_codegen::model::{JointKind, Unit};
 use mbd_codegen::plan::Plan;
+use mbd_runtime::contact::Reducible;
 use mbd_runtime::sweep::{Derivatives, ParameterDerivatives, Sweeps};
 use mbd_runtime::tree::Source;
 use mbd_runtime::{Dual, Interpreter, Scalar};
@@ -28,6 +29,8 @@ pub struct State {
     pub gravity: [f64; 3],
     /// Parameters, within ten per cent of their defaults.
     pub params: Vec<f64>,
+    /// 1 for each row that acts, 0 for one that does not, in plans whose rows act by numbers; 1 everywhere at first.
+    pub acts: Vec<f64>,
 }
 
 /// A random state of a plan.
@@ -58,6 +61,7 @@ pub fn random_state(plan: &Plan, seed: u64) -> State {
         wrenches: (0..d.wrenches).map(|_| std::array::from_fn(|k| list(6, 4.0)[k])).collect(),
         gravity,
         params,
+        acts: vec![1.0; d.rows],
         q,
     }
 }
@@ -95,6 +99,7 @@ impl State {
             ("wrenches", self.wrenches.as_flattened()),
             ("params", &self.params),
             ("gravity", &self.gravity),
+            ("acts", &self.acts),
         ])
     }
 
@@ -107,6 +112,14 @@ impl State {
     /// An interpreter of the plan with this state's inputs.
     pub fn interpreter(&self, plan: &Plan) -> Interpreter<f64> {
         self.interpreter_of(plan, |x, _| x)
+    }
+
+    /// The interpreter in which only some rows act, with this state's inputs; one entry of `acts` for each row.
+    pub fn interpreter_acting(&self, plan: &Plan, acts: &[bool]) -> Interpreter<f64> {
+        let mut full = self.interpreter(plan);
+        let mut reduced = full.acting(acts);
+        Reducible::swap_inputs(&mut reduced, &mut full);
+        reduced
     }
 
     /// The same interpreter over any scalar. `lift` makes a scalar of a number and its rate of change; only prescribed

@@ -2,6 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
+use mbd_runtime::contact::Reducible;
 use mbd_runtime::Interpreter;
 
 use super::instructions::INPUTS;
@@ -40,7 +41,13 @@ pub struct Compiled<S: Number = f64> {
     pub(super) interpreter: Interpreter<S>,
     /// Whether the interpreter computes everything.
     interpreted: bool,
+    /// Number of calls of an output that the interpreter computes before the output is compiled.
+    patience: u32,
+    /// Calls of each of [`Output::ALL`], counted up to that number.
+    calls: Vec<u32>,
     params: Vec<S>,
+    /// 1 for each row that acts, 0 for one that does not, where that is an input.
+    pub(super) acts: Vec<S>,
     scratch: Vec<S>,
     /// Arguments and results that have to be copied.
     pub(super) copies: Vec<S>,
@@ -112,8 +119,19 @@ impl<S: Number> Compiled<S> {
         let interpreter = plan.interpreter(&params);
         let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
         let shared = Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new() };
-        let (shared, scratch, copies) = (Arc::new(shared), Vec::new(), Vec::new());
-        Ok(Compiled { shared, interpreter, interpreted: false, params, scratch, copies })
+        let (acts, shared) = (vec![S::one(); sizes.acts], Arc::new(shared));
+        let (scratch, copies) = (Vec::new(), Vec::new());
+        Ok(Compiled {
+            shared,
+            interpreter,
+            interpreted: false,
+            patience: 0,
+            calls: Vec::new(),
+            params,
+            acts,
+            scratch,
+            copies,
+        })
     }
 
     /// The same mechanism, whose traits are computed by the interpreter alone, for comparison. In exact arithmetic it
@@ -121,6 +139,16 @@ impl<S: Number> Compiled<S> {
     #[must_use]
     pub fn interpreted(self) -> Self {
         Compiled { interpreted: true, ..self }
+    }
+
+    /// Number of calls for which the interpreter takes about as long as making the code takes.
+    pub const WORTHWHILE: u32 = 1000;
+
+    /// The same mechanism, whose outputs are compiled after so many calls each. Until then the interpreter computes them:
+    /// code that is hardly used is not worth the time of making it. In exact arithmetic both give the same bits.
+    #[must_use]
+    pub fn compiled_after(self, calls: u32) -> Self {
+        Compiled { patience: calls, calls: vec![0; Output::ALL.len()], ..self }
     }
 
     /// The plan of which the code is made.
@@ -187,7 +215,7 @@ impl<S: Number> Compiled<S> {
             .map_err(|words| CompileError::Arrays { output, words })?;
         let given = |k: usize| arguments.get(k).copied().unwrap_or_default();
         let scratch = long_enough(&mut self.scratch, code);
-        call(code, [given(0), given(1), given(2)], &self.interpreter, &self.params, results, scratch);
+        call(code, [given(0), given(1), given(2)], (&self.interpreter, &self.params, &self.acts), results, scratch);
         Ok(())
     }
 
@@ -232,10 +260,32 @@ impl<S: Number> Compiled<S> {
         if self.interpreted {
             return false;
         }
+        if self.patience > 0 && !self.patient(output) {
+            return false;
+        }
         let Ok(code) = self.shared.output(output) else { return false };
         let scratch = long_enough(&mut self.scratch, code);
-        call(code, arguments, &self.interpreter, &self.params, results, scratch);
+        call(code, arguments, (&self.interpreter, &self.params, &self.acts), results, scratch);
         true
+    }
+
+    /// Counts a call of an output; whether it is to be compiled.
+    fn patient(&mut self, output: Output) -> bool {
+        let calls = &mut self.calls[output as usize];
+        *calls = (*calls + 1).min(self.patience);
+        *calls == self.patience
+    }
+
+    /// The mechanism in which only some rows of the constraints act, one entry of `acts` for each row: with the
+    /// parameters and the gravity of this one, and other inputs that are zero.
+    fn with_rows(&self, acts: &[bool]) -> Self {
+        let options = self.shared.options.clone();
+        let Shared { plan, sizes, .. } = &*self.shared;
+        let plan = plan.acting(acts);
+        let interpreter = self.interpreter.acting(acts);
+        let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
+        let shared = Shared { plan, options, sizes: *sizes, outputs, coordinate_rates: OnceLock::new() };
+        Compiled { shared: Arc::new(shared), interpreter, calls: vec![0; self.calls.len()], ..self.clone() }
     }
 
     /// `q̇ = N(q) v`.
@@ -247,8 +297,24 @@ impl<S: Number> Compiled<S> {
         // These programs have few angles, or none, so that nothing is allocated.
         let (mut few, mut many) = ([S::zero(); FEW], Vec::new());
         let scratch = if code.scratch() <= FEW { &mut few[..] } else { long_enough(&mut many, code) };
-        call(code, [q, v, &[]], &self.interpreter, &self.params, &mut [qd], scratch);
+        call(code, [q, v, &[]], (&self.interpreter, &self.params, &self.acts), &mut [qd], scratch);
         true
+    }
+}
+
+impl<S: Number> Reducible for Compiled<S> {
+    fn acting(&self, acts: &[bool]) -> Self {
+        self.with_rows(acts)
+    }
+
+    fn swap_inputs(&mut self, other: &mut Self) {
+        Reducible::swap_inputs(&mut self.interpreter, &mut other.interpreter);
+    }
+
+    fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
+        if !self.run(Output::Gaps, [q, v, &[]], &mut [gaps, velocities, entries]) {
+            self.interpreter.gaps(q, v, gaps, velocities, entries);
+        }
     }
 }
 
@@ -271,20 +337,20 @@ fn long_enough<'a, S: Number>(scratch: &'a mut Vec<S>, code: &MachineCode<S>) ->
     scratch
 }
 
-/// Calls machine code with the inputs of an interpreter.
+/// Calls machine code with the inputs of an interpreter, parameters, and the rows that act.
 #[inline]
 fn call<S: Number>(
     code: &MachineCode<S>,
     [a, b, c]: [&[S]; 3],
-    inputs: &Interpreter<S>,
-    params: &[S],
+    (inputs, params, acts): (&Interpreter<S>, &[S], &[S]),
     results: &mut [&mut [S]],
     scratch: &mut [S],
 ) {
     // In the order of the table of fields.
     let Interpreter { tau, drive_q, drive_v, drive_a, wrenches, gravity, .. } = inputs;
     let gravity = if code.reads_gravity() { &gravity[..] } else { &[] };
-    let given: [&[S]; INPUTS] = [a, b, c, tau, drive_q, drive_v, drive_a, wrenches.as_flattened(), params, gravity];
+    let given: [&[S]; INPUTS] =
+        [a, b, c, tau, drive_q, drive_v, drive_a, wrenches.as_flattened(), params, gravity, acts];
     code.call(&given, results, scratch);
 }
 

@@ -10,9 +10,9 @@ pub use program::{flat_entry, InputArray, OutputProgram};
 pub use spec::{Array, Availability, Dim, Field, Search, Sizes, Spec};
 pub use text::{help, table};
 
-use Availability::{WithConstraints, WithoutConstraints};
+use Availability::{WithConstraints, WithContacts, WithoutConstraints};
 use Dim::{
-    Const, DriveQ, DriveV, Efforts, Entries, Frames, Gravity, Joints, Nq, Nv, Parameters, Params, Rows, Wrenches,
+    Acts, Const, DriveQ, DriveV, Efforts, Entries, Frames, Gravity, Joints, Nq, Nv, Parameters, Params, Rows, Wrenches,
 };
 
 const Q: Array = Array::new("q", &[Nq]);
@@ -27,7 +27,7 @@ const fn square(name: &'static str) -> Array {
 }
 
 /// Fields of a generated type, in the order in which programs number them.
-pub const FIELDS: [Field; 7] = [
+pub const FIELDS: [Field; 8] = [
     Field::new("tau", &[Efforts], "Joint forces, N m or N, one for each velocity."),
     Field::new("drive_q", &[DriveQ], "Prescribed positions."),
     Field::new("drive_v", &[DriveV], "Prescribed rates."),
@@ -35,6 +35,7 @@ pub const FIELDS: [Field; 7] = [
     Field::new("wrenches", &[Wrenches, Const(6)], "External wrenches `[force; moment]`, N and N m."),
     Field::new("params", &[Params], "Run-time parameters."),
     Field::new("gravity", &[Gravity], "Gravity in ground axes, m/s²."),
+    Field::new("acts", &[Acts], "1 for each row of the constraints that acts, 0 for one that does not."),
 ];
 
 /// The function that comes with the rates: coordinate rates of given velocities.
@@ -157,6 +158,14 @@ outputs! {
     /// Multipliers `λ` of the constraints, N and N m.
     /// The constraints act on the joints with `−Φᵀλ`.
     Multipliers = Spec::new("multipliers", &[Q, V], &[Array::new("lambda", &[Rows])]).only(WithConstraints);
+    /// Gaps of the contacts: residuals of all rows, their velocities `Φ v`, and the entries of `Φ`, whatever acts.
+    /// Of a contact's normal row the residual is the gap, m or rad, negative where bodies overlap; velocities are in m/s
+    /// or rad/s, those of prescribed motions included.
+    Gaps = Spec::new("gaps", &[Q, V], &[
+        Array::new("gaps", &[Rows]),
+        Array::new("velocities", &[Rows]),
+        Array::new("jacobian", &[Entries]),
+    ]).only(WithContacts);
 }
 
 impl Output {

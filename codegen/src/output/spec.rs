@@ -81,6 +81,8 @@ dimensions! {
     Wrenches, wrenches, "WRENCHES";
     /// Three where gravity is an input.
     Gravity, gravity, "GRAVITY";
+    /// Number of rows of the constraints where inputs say which of them act.
+    Acts, acts, "ACTS";
 }
 
 /// An argument of a generated function, an array: its name and its lengths, the outermost first.
@@ -132,6 +134,8 @@ pub enum Availability {
     WithConstraints,
     /// Models without constraints.
     WithoutConstraints,
+    /// Models with contacts, in code for their modes.
+    WithContacts,
 }
 
 /// The search for eliminations that an output uses.
@@ -194,12 +198,13 @@ impl Spec {
         self.results.iter().any(|array| array.dims.contains(&Dim::Frames))
     }
 
-    /// Whether a model with (or without) constraints has it.
+    /// Whether a model with (or without) constraints has it, its contacts left aside.
     pub fn available(&self, constrained: bool) -> bool {
         match self.availability {
             Availability::Every => true,
             Availability::WithConstraints => constrained,
             Availability::WithoutConstraints => !constrained,
+            Availability::WithContacts => false,
         }
     }
 }

@@ -21,7 +21,12 @@ impl Spec {
 pub fn help() -> String {
     let mut out = "What to compute, with commas between, or `all`:".to_string();
     let rows = |out: &mut String, constrained: bool| {
-        let with = |spec: &&Spec| (spec.availability == Availability::WithConstraints) == constrained;
+        // Code for the modes of contacts has its own outputs, which nobody asks for one by one.
+        let with = |spec: &&Spec| match spec.availability {
+            Availability::Every | Availability::WithoutConstraints => !constrained,
+            Availability::WithConstraints => constrained,
+            Availability::WithContacts => false,
+        };
         for spec in Output::ALL.iter().map(|output| output.spec()).filter(with) {
             let _ = write!(out, "\n  {} {}", spec.name, spec.arrow());
             spec.doc().take(1).for_each(|line| {
@@ -50,6 +55,7 @@ pub fn table() -> String {
             Availability::Every => "",
             Availability::WithConstraints => " Only with loops or couplings.",
             Availability::WithoutConstraints => " Not with loops or couplings.",
+            Availability::WithContacts => " Only in code for the modes of contacts.",
         };
         let inputs = names(spec.inputs.iter().map(|array| array.name));
         let (results, doc) = (results.collect::<Vec<_>>().join(", "), spec.doc().collect::<Vec<_>>().join(" "));

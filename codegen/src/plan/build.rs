@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use mbd_runtime::tree::{Dims, Source, WrenchAxes};
 
-use super::structure::{Plan, PlanFrame, Slot};
+use super::structure::{Plan, PlanFrame, RowsThatAct, Slot};
 use super::{constraints, elements, frames, row_order, shared};
 use crate::model::{self, JointMotion, Model};
 
@@ -32,6 +32,7 @@ impl Plan {
             wrenches: Vec::new(),
             constraints: Vec::new(),
             contact_frames,
+            acts: RowsThatAct::All,
             notices,
             matrix_depth: 0,
             accelerations: None,

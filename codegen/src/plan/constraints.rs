@@ -8,7 +8,7 @@ use mbd_runtime::tree::{Source, Unknown};
 use super::elements::{Carried, Elements};
 use super::placement::{constant, direction, placement};
 use super::rigid::Rigid;
-use super::structure::{Plan, PlanBond, PlanConstraint, PlanFrame, PoseStep};
+use super::structure::{Plan, PlanBond, PlanConstraint, PlanFrame, PoseStep, RowsThatAct};
 use crate::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Stands, Value};
 
 /// Frames of loops and then of contacts: the element that carries each, and its pose with the axes that the rows need.
@@ -109,9 +109,8 @@ pub fn constrain(plan: &mut Plan, constraints: &[Constraint], frames: &[Option<[
 }
 
 impl Plan {
-    /// The plan with the rows of all contacts after those of the constraints. Its trees are to be reduced to the rows that
-    /// act ([`mbd_runtime::tree::Tree::acting`]).
-    pub(crate) fn with_contacts(&self) -> Plan {
+    /// The plan with the rows of all contacts after those of the constraints, all of which act: for gaps.
+    pub fn with_contacts(&self) -> Plan {
         let mut plan = self.clone();
         let contacts = self.model.contacts.iter();
         let contacts = contacts.map(|c| Constraint::new(c.name.clone(), c.kind.clone(), Value::ZERO));
@@ -119,6 +118,40 @@ impl Plan {
         plan.contact_frames.clear();
         plan.accelerations = self.accelerations.as_ref().map(|other| Box::new(other.with_contacts()));
         plan
+    }
+}
+
+impl Plan {
+    /// The plan in which only some rows act, one entry for each row. Rows keep their numbers. With every choice of rows,
+    /// those that act are eliminated in the same order.
+    pub fn acting(&self, acts: &[bool]) -> Plan {
+        let mut plan = self.clone();
+        plan.retain_rows(acts);
+        plan.acts = RowsThatAct::Some(Box::new((self.clone(), acts.to_vec())));
+        plan
+    }
+
+    /// Whether the rows of contacts are among its rows.
+    pub fn has_contacts(&self) -> bool {
+        !self.model.contacts.is_empty() && self.contact_frames.is_empty()
+    }
+
+    fn retain_rows(&mut self, acts: &[bool]) {
+        let silent: Vec<usize> = self
+            .constraints
+            .iter()
+            .flat_map(|c| c.slots.iter().enumerate().filter(|(k, _)| !acts[c.first + k]).map(|(_, g)| *g))
+            .collect();
+        self.close_columns(&silent);
+        self.constraints.retain(|c| acts[c.first..c.first + c.slots.len()].contains(&true));
+        if let Some(other) = &mut self.accelerations {
+            other.retain_rows(acts);
+        }
+    }
+
+    /// The plan whose rows act by numbers, the field `acts` of generated code.
+    pub fn masked(&self) -> Plan {
+        Plan { acts: RowsThatAct::Input, ..self.clone() }
     }
 }
 

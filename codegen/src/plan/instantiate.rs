@@ -6,7 +6,7 @@ use mbd_runtime::tree::{Bond, Constraint, Cut, Node, Passive, Tree, TreeFrame, T
 use mbd_runtime::{Interpreter, Scalar};
 
 use super::placement::rotation;
-use super::structure::{Plan, PlanBond, PlanConstraint, PlanNode, PoseStep};
+use super::structure::{Plan, PlanBond, PlanConstraint, PlanNode, PoseStep, RowsThatAct};
 use crate::model::{Gravity, Value};
 
 /// A number of the model as a scalar.
@@ -63,8 +63,11 @@ pub(super) fn body_inertia<S: Scalar>(
 impl Plan {
     /// An interpreter with given parameters and the model's gravity (zero where it is an input: set it before a call).
     pub fn interpreter<S: Scalar>(&self, params: &[S]) -> Interpreter<S> {
-        Interpreter::new(self.tree(params), self.gravity(params))
-            .with_names(self.velocity_names(), self.constraint_names())
+        match &self.acts {
+            RowsThatAct::Some(of) => of.0.interpreter(params).acting(&of.1),
+            RowsThatAct::All | RowsThatAct::Input => Interpreter::new(self.tree(params), self.gravity(params))
+                .with_names(self.velocity_names(), self.constraint_names()),
+        }
     }
 
     /// The interpreter with the parameters at their defaults.
@@ -85,14 +88,23 @@ impl Plan {
         }
     }
 
-    /// Rows of the constraints.
+    /// The plan itself, or the one some rows of which act in it.
+    fn with_all_rows(&self) -> &Plan {
+        if let RowsThatAct::Some(of) = &self.acts {
+            &of.0
+        } else {
+            self
+        }
+    }
+
+    /// Rows of the constraints, those that do not act among them.
     pub fn rows(&self) -> Vec<Row> {
-        self.tree(&self.default_params()).rows()
+        self.with_all_rows().tree(&self.default_params()).rows()
     }
 
     /// Velocity index of every entry of `Φ`, row by row.
     pub fn entry_columns(&self) -> Vec<usize> {
-        self.tree(&self.default_params()).entry_columns()
+        self.with_all_rows().tree(&self.default_params()).entry_columns()
     }
 
     /// The tree with given parameters, not regrouped. `params` has one entry for each run-time parameter.
@@ -113,6 +125,7 @@ impl Plan {
             wrenches: wrenches.collect(),
             constraints: self.constraints.iter().map(|c| c.instantiate(params)).collect(),
             tolerance: S::rank_tolerance(),
+            row_factors: None,
             joint_nodes: self.joint_nodes.clone(),
             matrix_depth: self.matrix_depth,
             accelerations: self.accelerations.as_ref().map(|other| Box::new(other.tree(params))),

@@ -21,4 +21,4 @@ pub use chain::ChainElimination;
 pub(crate) use paths::{is_single_but_for_rows, touches_rolled, unbranched_paths};
 pub use paths::{parallel_runs, tip_chains};
 pub use rigid::Rigid;
-pub use structure::{Plan, PlanBond, PlanConstraint, PlanFrame, PlanNode, PoseStep, Slot};
+pub use structure::{Plan, PlanBond, PlanConstraint, PlanFrame, PlanNode, PoseStep, RowsThatAct, Slot};

@@ -124,12 +124,26 @@ pub struct Plan {
     pub constraints: Vec<PlanConstraint>,
     /// The two frames of every contact between bodies, until contacts are among the constraints.
     pub contact_frames: Vec<Option<[PlanFrame; 2]>>,
+    /// Which of its rows act.
+    pub acts: RowsThatAct,
     /// Notices about changes, such as angles that became right angles.
     pub notices: Vec<String>,
     /// See [`mbd_runtime::tree::Tree`].
     pub matrix_depth: usize,
     /// The same plan with another elimination for accelerations, if that is cheaper.
     pub accelerations: Option<Box<Plan>>,
+}
+
+/// Which rows of the constraints of a plan act.
+#[derive(Clone, Debug)]
+pub enum RowsThatAct {
+    /// All of them.
+    All,
+    /// Some rows of a plan with more rows, one entry for each of its rows. Rows keep their numbers; what the others bind
+    /// is not in this plan.
+    Some(Box<(Plan, Vec<bool>)>),
+    /// Those for which the generated type's field `acts` is 1; where it is 0, the row does not act.
+    Input,
 }
 
 /// The nodes that a constraint connects.

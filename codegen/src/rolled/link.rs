@@ -97,6 +97,7 @@ impl<'g, 'a> Link<'g, 'a> {
             wrenches: Vec::new(),
             params: Vec::new(),
             gravity: [zero; 3],
+            acts: Vec::new(),
         };
         let dims = Dims { nq, nv, rows: tree.dims.rows, ..Dims::default() };
         let constraints: Vec<_> = tree.constraints.iter().map(|c| stand_in(c, run)).collect();
@@ -112,6 +113,7 @@ impl<'g, 'a> Link<'g, 'a> {
             wrenches: Vec::new(),
             constraints,
             tolerance: Expr::rank_tolerance(),
+            row_factors: None,
             frames: Vec::new(),
             joint_nodes: Vec::new(),
             accelerations: None,

@@ -18,7 +18,7 @@ use std::collections::BTreeSet;
 
 use crate::options::{Options, RolledCode};
 use crate::output::{Output, OutputProgram};
-use crate::plan::Plan;
+use crate::plan::{Plan, RowsThatAct};
 use crate::symbolic::{Counts, Program, ProgramResult};
 
 pub use cost::cost;
@@ -183,6 +183,10 @@ impl RolledProgram {
 
 /// The loop form of a group; `None` where there is none, or straight-line code is better.
 pub fn rolled(plan: &Plan, group: Output, options: &Options) -> Option<OutputProgram<RolledProgram>> {
+    // Rows that act by numbers are not known to loops.
+    if matches!(plan.acts, RowsThatAct::Input) {
+        return None;
+    }
     let least = match options.plan.rolled {
         RolledCode::Never => return None,
         RolledCode::Auto => LEAST,

@@ -55,6 +55,9 @@ impl<'g> Directional<'_, 'g> {
         let (given, zero) = (self.given, Dual::zero());
         let mut tree = self.plan.tree(params).regrouped();
         tree.tolerance = Dual::new(self.tolerance, Expr::zero());
+        if !given.acts.is_empty() {
+            tree = tree.with_row_factors(fixed(&given.acts));
+        }
         let gravity = self.plan.gravity_or(params, || given.gravity.map(|x| Dual::new(x, Expr::zero())));
         let [drive_q, drive_v, drive_a] = given.drive.each_ref().map(|x| fixed(x));
         let wrenches: Vec<[Dual<Expr>; 6]> =

@@ -5,7 +5,7 @@ use mbd_runtime::sweep::Inputs;
 use crate::model::Gravity;
 use crate::options::Options;
 use crate::output::{Array, InputArray, Sizes, Spec, FIELDS};
-use crate::plan::Plan;
+use crate::plan::{Plan, RowsThatAct};
 use crate::symbolic::{Expr, Graph};
 
 /// Arrays of symbols with consecutively numbered entries.
@@ -45,6 +45,8 @@ pub(crate) struct SymbolicInputs<'g> {
     pub params: Vec<Expr<'g>>,
     /// Gravity in ground axes.
     pub gravity: [Expr<'g>; 3],
+    /// 1 for each row that acts, 0 for one that does not, where that is an input.
+    pub acts: Vec<Expr<'g>>,
 }
 
 impl<'g> SymbolicInputs<'g> {
@@ -55,12 +57,12 @@ impl<'g> SymbolicInputs<'g> {
         let mut state =
             spec.inputs.iter().map(|array| symbols.array(array, false, sizes)).collect::<Vec<_>>().into_iter();
         let [q, second, third] = [0; 3].map(|_| state.next().unwrap_or_default());
-        let [tau, drive_q, drive_v, drive_a, wrenches, params, gravity] =
+        let [tau, drive_q, drive_v, drive_a, wrenches, params, gravity, acts] =
             FIELDS.map(|field| symbols.array(&field.array, true, sizes));
         let wrenches = wrenches.chunks(6).map(|c| std::array::from_fn(|k| c[k])).collect();
         let gravity = plan.gravity_or(&params, || std::array::from_fn(|k| gravity[k]));
         let drive = [drive_q, drive_v, drive_a];
-        SymbolicInputs { arrays: symbols.arrays, q, second, third, tau, drive, wrenches, params, gravity }
+        SymbolicInputs { arrays: symbols.arrays, q, second, third, tau, drive, wrenches, params, gravity, acts }
     }
 
     /// Number of the first entry of an array.
@@ -92,5 +94,6 @@ pub fn sizes(plan: &Plan, options: &Options, frames: usize) -> Sizes {
         drive_v: dims.drive_v,
         wrenches: dims.wrenches,
         gravity: if plan.model.gravity == Gravity::Input { 3 } else { 0 },
+        acts: if matches!(plan.acts, RowsThatAct::Input) { dims.rows } else { 0 },
     }
 }

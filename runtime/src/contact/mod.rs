@@ -8,14 +8,14 @@ mod assembly;
 mod hybrid;
 mod instant;
 #[cfg(feature = "alloc")]
-mod interpreted;
+mod mode_table;
 mod solver;
 mod touching;
 mod with_contacts;
 
 pub use hybrid::{Cause, ContactEvent, ContactObserver, ContactRules, ContactStatistics, Hybrid, HybridError, Stretch};
 #[cfg(feature = "alloc")]
-pub use interpreted::ContactInterpreter;
+pub use mode_table::{ContactInterpreter, ModeTable, Reducible};
 pub use solver::{
     impact, solve, work_len, Certificate, ContactError, Effort, Impact, ImpactOptions, ImpactOrder, Problem, Touch,
 };

@@ -62,6 +62,7 @@ pub fn empty<S: Scalar>() -> Tree<S> {
         wrenches: vec![],
         constraints: vec![],
         tolerance: S::rank_tolerance(),
+        row_factors: None,
         frames: vec![],
         joint_nodes: vec![],
         matrix_depth: 0,

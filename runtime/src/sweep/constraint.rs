@@ -159,7 +159,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 Bond::Cut(cut) => self.cut_rows(index, constraint, cut, w, all || !constraint.at_hand()),
                 Bond::Coupling { terms, offset } => {
                     let sum = terms.iter().map(|(i, ratio)| *ratio * w.poses.coordinate(*i, 0));
-                    w.constraints.rows[constraint.first].residual = sum.fold(-*offset, |sum, x| sum + x);
+                    let residual = sum.fold(-*offset, |sum, x| sum + x);
+                    w.constraints.rows[constraint.first].residual = self.if_acts(constraint.first, residual);
                 }
             }
             for r in constraint.range() {
@@ -180,7 +181,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         w.constraints.relative[index] = at;
         for (k, r) in constraint.range().enumerate() {
             let row = &mut w.constraints.rows[r];
-            (row.e, row.residual) = (directions[k], residuals[k]);
+            (row.e, row.residual) = (directions[k], self.if_acts(constraint.first, residuals[k]));
             (row.at_a, row.at_b) = self.at_nodes(cut, &at, &directions[k], &w.poses);
         }
     }
@@ -254,13 +255,19 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let own = constraint.is_rotation(r - constraint.first);
         let (mut alike, mut all) = (S::zero(), S::zero());
         for (k, &h) in constraint.slots.iter().enumerate() {
-            all = all + f.whole[h];
+            let whole = self.if_acts(constraint.first + k, f.whole[h]);
+            all = all + whole;
             if constraint.is_rotation(k) == own {
-                alike = alike + f.whole[h];
+                alike = alike + whole;
             }
         }
         let floor = tolerance * (alike + tolerance * (all + S::one()));
-        -(-f.gram[g * ng + g]).reciprocal_above(floor)
+        self.if_acts(r, -(-f.gram[g * ng + g]).reciprocal_above(floor))
+    }
+
+    /// `x` where row `r` acts, zero where it does not.
+    fn if_acts(&self, r: usize, x: S) -> S {
+        self.tree.row_factors.as_ref().map_or(x, |factors| factors[r] * x)
     }
 
     /// Compliance of row `r`.
@@ -398,7 +405,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 let entries = &mut entries[first..first + bound.len()];
                 let mut put = |v: usize, x: S| {
                     if let Ok(at) = bound.binary_search(&v) {
-                        entries[at] = entries[at] + x;
+                        entries[at] = entries[at] + self.if_acts(constraint.first, x);
                     }
                 };
                 match &constraint.bond {

@@ -281,13 +281,23 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.row_entries(w, entries);
     }
 
-    /// Velocities of the rows of the constraints at velocities `v`: `Φ v` and what prescribed motions add to it.
-    pub fn row_velocities(&self, q: &[S], v: &[S], u: &Inputs<S>, w: &mut Workspace<S>, out: &mut [S]) {
+    /// Residuals `φ(q)` of the positions, velocities of the rows at velocities `v` (`Φ v` and what prescribed motions add
+    /// to it), and the entries of `Φ`, placed as [`crate::tree::Tree::entry_columns`] says.
+    pub fn gaps(
+        &self,
+        q: &[S],
+        v: &[S],
+        u: &Inputs<S>,
+        w: &mut Workspace<S>,
+        [phi, velocities, entries]: [&mut [S]; 3],
+    ) {
         let given = Arguments::new(q, v, u);
         let mut cx = self.context(&given, w, Results::none());
         cx.articulate();
         cx.sweep([Sweep::ALL_PATHS, Sweep::ALL_ROWS, Sweep::VELOCITY]);
-        self.velocities_of_rows(w, out);
+        self.residuals(w, phi);
+        self.velocities_of_rows(w, velocities);
+        self.row_entries(w, entries);
     }
 
     /// Articulated inertia with all freedoms and unknowns eliminated.

@@ -22,6 +22,7 @@ impl<S: Scalar> Tree<S> {
                 .collect(),
             constraints: self.constraints.iter().map(|c| c.map(of)).collect(),
             tolerance: of(self.tolerance),
+            row_factors: self.row_factors.as_ref().map(|factors| factors.iter().map(|x| of(*x)).collect()),
             frames: self.frames.iter().map(|f| f.map(of)).collect(),
             joint_nodes: self.joint_nodes.clone(),
             matrix_depth: self.matrix_depth,

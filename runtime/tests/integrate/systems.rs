@@ -114,6 +114,7 @@ pub fn rotor() -> Interpreter<f64> {
         wrenches: vec![],
         constraints: vec![],
         tolerance: 1e-10,
+        row_factors: None,
         frames: vec![],
         joint_nodes: vec![],
         matrix_depth: 0,

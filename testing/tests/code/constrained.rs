@@ -27,13 +27,26 @@ struct Case {
     p: Vec<f64>,
     emitted: Emitted,
     derivatives: bool,
+    /// The rows that act, if not all do.
+    acts: Option<Vec<bool>>,
+}
+
+/// How code is told which rows act.
+#[derive(Clone, Copy, PartialEq)]
+enum Rows {
+    /// All act.
+    All,
+    /// It is made for a choice of rows.
+    Made,
+    /// By numbers.
+    Input,
 }
 
 impl Case {
-    fn new(seed: u64) -> Option<Case> {
+    fn new(seed: u64, rows: Rows) -> Option<Case> {
         let system = random_loops(seed, &LoopKnobs::everything(seed, [3, 4, 6, 8][seed as usize % 4]));
         let mut rng = Rng::new(seed, 8);
-        let derivatives = seed.is_multiple_of(4);
+        let derivatives = rows == Rows::All && seed.is_multiple_of(4);
         let mut outputs = vec![
             Output::Rates,
             Output::Momenta,
@@ -55,13 +68,22 @@ impl Case {
             _ => random_plan(&system.model, seed),
         };
         system.state.interpreter(&plan).check_rank(&system.state.q).ok()?;
-        let source = generate_from(&plan, &options).unwrap_or_else(|e| panic!("seed {seed}: {e}")).source;
         let mut state = system.state;
+        let acts = (rows != Rows::All).then(|| random_rows(&plan, &mut rng));
+        let of_rows = match (rows, &acts) {
+            (Rows::Made, Some(acts)) => plan.acting(acts),
+            (Rows::Input, Some(acts)) => {
+                state.acts = acts.iter().map(|acts| f64::from(u8::from(*acts))).collect();
+                plan.masked()
+            }
+            _ => plan.clone(),
+        };
+        let source = generate_from(&of_rows, &options).unwrap_or_else(|e| panic!("seed {seed}: {e}")).source;
         if !options.efforts {
             state.tau.fill(0.0);
         }
         let p = (0..plan.dims.nv).map(|_| rng.around(2.0)).collect();
-        Some(Case { seed, plan, state, p, emitted: Emitted::parse(&source), derivatives })
+        Some(Case { seed, plan, state, p, emitted: Emitted::parse(&source), derivatives, acts })
     }
 
     fn compare(&self, what: &str, emitted: &[f64], interpreted: &[f64]) {
@@ -72,7 +94,10 @@ impl Case {
         let s = &self.state;
         let inputs = s.inputs(&self.p, &[]);
         let run = |output: Output| self.emitted.run(output.name(), &inputs);
-        let mut i = s.interpreter(&self.plan);
+        let mut i = match &self.acts {
+            None => s.interpreter(&self.plan),
+            Some(acts) => s.interpreter_acting(&self.plan, acts),
+        };
         let (nq, nv) = (self.plan.dims.nq, self.plan.dims.nv);
         let (mut v, mut qd, mut pd) = (vec![0.0; nv], vec![0.0; nq], vec![0.0; nv]);
         i.rates(&s.q, &self.p, &mut v, &mut qd, &mut pd);
@@ -168,12 +193,24 @@ impl Case {
     }
 }
 
+/// Rows that act: of some constraints none, of others the first and some of the rest, as of contacts.
+fn random_rows(plan: &Plan, rng: &mut Rng) -> Vec<bool> {
+    let mut acts = vec![true; plan.dims.rows];
+    for constraint in &plan.constraints {
+        let any = rng.chance(0.6);
+        for k in 0..constraint.slots.len() {
+            acts[constraint.first + k] = any && (k == 0 || rng.chance(0.6));
+        }
+    }
+    acts
+}
+
 /// Checks mechanisms. No code can be generated for a mechanism that has a freedom without inertia after its tree was
 /// made planar; such mechanisms are left out.
-fn batch(seeds: std::ops::Range<u64>) {
+fn batch(seeds: std::ops::Range<u64>, rows: Rows) {
     let mut left_out = 0;
     for seed in seeds.clone() {
-        match Case::new(seed) {
+        match Case::new(seed, rows) {
             Some(case) => case.check(),
             None => left_out += 1,
         }
@@ -185,12 +222,22 @@ fn batch(seeds: std::ops::Range<u64>) {
 
 #[test]
 fn mechanisms_0_to_24() {
-    batch(0..25);
+    batch(0..25, Rows::All);
 }
 
 #[test]
 fn mechanisms_25_to_49() {
-    batch(25..50);
+    batch(25..50, Rows::All);
+}
+
+#[test]
+fn code_of_some_rows() {
+    batch(0..30, Rows::Made);
+}
+
+#[test]
+fn code_of_rows_that_act_by_numbers() {
+    batch(0..30, Rows::Input);
 }
 
 /// Code of a mechanism with constraints has the outputs for constraints, by default and with all outputs; code of a

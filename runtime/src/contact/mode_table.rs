@@ -1,0 +1,238 @@
+//! Mechanisms with contacts: one evaluator for each set of modes that a motion visits.
+
+use alloc::vec;
+use alloc::vec::Vec;
+use core::ops::{Deref, DerefMut};
+
+use super::{Contact, Mode, Touching};
+use crate::interp::Interpreter;
+use crate::system::{system_within, Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
+use crate::Scalar;
+
+/// A mechanism whose rows can be taken out of its equations.
+pub trait Reducible: Constrained<Scalar: Real> + Energetic + Conjugate + Sized {
+    /// The mechanism in which only some rows act, one entry of `acts` for each row. Its rows have the numbers that they
+    /// have here; those that do not act have no residuals, entries and multipliers.
+    fn acting(&self, acts: &[bool]) -> Self;
+
+    /// Exchanges its inputs with those of another evaluator of the same mechanism.
+    fn swap_inputs(&mut self, other: &mut Self);
+
+    /// Residuals of all rows, their velocities and the entries of `Φ`: [`Touching::gaps`].
+    fn gaps(
+        &mut self,
+        q: &Self::Coordinates,
+        v: &Self::Momenta,
+        gaps: &mut Self::Rows,
+        velocities: &mut Self::Rows,
+        entries: &mut Self::Entries,
+    );
+}
+
+impl<S: Real> Reducible for Interpreter<S> {
+    fn acting(&self, acts: &[bool]) -> Self {
+        Interpreter::acting(self, acts)
+    }
+
+    fn swap_inputs(&mut self, other: &mut Self) {
+        Interpreter::swap_inputs(self, other);
+    }
+
+    fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
+        Interpreter::gaps(self, q, v, gaps, velocities, entries);
+    }
+}
+
+/// A mechanism with contacts. An evaluator of the rows that act is made when a set of modes is first met, and kept.
+///
+/// It dereferences to the evaluator that is in use, whose inputs are handed over when modes change.
+#[derive(Clone, Debug)]
+pub struct ModeTable<Y: System> {
+    /// All rows act: for gaps.
+    full: Y,
+    modes: Vec<(Vec<Mode>, Y)>,
+    current: usize,
+    contacts: Vec<Contact<Y::Scalar>>,
+}
+
+/// A mechanism with contacts in the interpreter.
+pub type ContactInterpreter<S> = ModeTable<Interpreter<S>>;
+
+impl<Y: Reducible> ModeTable<Y> {
+    /// From an evaluator whose constraints include the contacts' rows. All contacts are open at first.
+    pub fn new(full: Y, contacts: Vec<Contact<Y::Scalar>>) -> Self {
+        let open = vec![Mode::Open; contacts.len()];
+        let first = full.acting(&acting(full.rows().len(), &contacts, &open));
+        ModeTable { full, modes: vec![(open, first)], current: 0, contacts }
+    }
+
+    /// The sets of modes that were met, in the order in which they were.
+    pub fn sets_of_modes(&self) -> impl ExactSizeIterator<Item = &[Mode]> {
+        self.modes.iter().map(|(modes, _)| modes.as_slice())
+    }
+
+    /// Sets the contacts' coefficient of friction, where they have tangential rows.
+    pub fn set_friction(&mut self, friction: Y::Scalar) {
+        self.contacts.iter_mut().filter(|c| c.tangents).for_each(|c| c.friction = friction);
+    }
+
+    /// Sets the contacts' coefficient of restitution.
+    pub fn set_restitution(&mut self, restitution: Y::Scalar) {
+        self.contacts.iter_mut().for_each(|c| c.restitution = restitution);
+    }
+}
+
+/// Which rows act.
+fn acting<S>(rows: usize, contacts: &[Contact<S>], modes: &[Mode]) -> Vec<bool> {
+    let mut acts = vec![true; rows];
+    for (contact, mode) in contacts.iter().zip(modes) {
+        for k in 0..contact.rows() {
+            acts[contact.row + k] = mode.acts(k);
+        }
+    }
+    acts
+}
+
+impl<Y: System> Deref for ModeTable<Y> {
+    type Target = Y;
+    fn deref(&self) -> &Y {
+        &self.modes[self.current].1
+    }
+}
+
+impl<Y: System> DerefMut for ModeTable<Y> {
+    fn deref_mut(&mut self) -> &mut Y {
+        &mut self.modes[self.current].1
+    }
+}
+
+impl<Y: Reducible> System for ModeTable<Y> {
+    system_within!(full: Y);
+
+    fn lie_joints(&self) -> &[LieJoint] {
+        self.full.lie_joints()
+    }
+
+    fn rates_at(
+        &mut self,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+        qd: &mut Y::Coordinates,
+        pd: &mut Y::Momenta,
+    ) {
+        (**self).rates_at(t, q, p, qd, pd);
+    }
+}
+
+impl<Y: Reducible> Energetic for ModeTable<Y> {
+    fn energies(&mut self, q: &Y::Coordinates, p: &Y::Momenta) -> (Y::Scalar, Y::Scalar) {
+        (**self).energies(q, p)
+    }
+}
+
+impl<Y: Reducible> Conjugate for ModeTable<Y> {
+    fn conjugate_momenta(&mut self, q: &Y::Coordinates, v: &Y::Momenta, p: &mut Y::Momenta) {
+        (**self).conjugate_momenta(q, v, p);
+    }
+}
+
+impl<Y: Reducible> Constrained for ModeTable<Y> {
+    type Rows = Y::Rows;
+    type Entries = Y::Entries;
+
+    fn zero_rows(&self) -> Y::Rows {
+        self.full.zero_rows()
+    }
+
+    fn zero_entries(&self) -> Y::Entries {
+        self.full.zero_entries()
+    }
+
+    fn rows(&self) -> &[Row] {
+        self.full.rows()
+    }
+
+    fn entry_columns(&self) -> &[usize] {
+        self.full.entry_columns()
+    }
+
+    fn constraint_residuals(&mut self, q: &Y::Coordinates, residual: &mut Y::Rows, jacobian: &mut Y::Entries) {
+        (**self).constraint_residuals(q, residual, jacobian);
+    }
+
+    fn project_momenta(
+        &mut self,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &mut Y::Momenta,
+        v: &mut Y::Momenta,
+        sigma: &mut Y::Rows,
+    ) {
+        (**self).project_momenta(t, q, p, v, sigma);
+    }
+
+    fn position_correction(
+        &mut self,
+        q: &Y::Coordinates,
+        residual: &mut Y::Rows,
+        dq: &mut Y::Momenta,
+        pivots: &mut Y::Rows,
+    ) {
+        (**self).position_correction(q, residual, dq, pivots);
+    }
+
+    fn multipliers(&mut self, t: Y::Scalar, q: &Y::Coordinates, v: &Y::Momenta, lambda: &mut Y::Rows) {
+        (**self).multipliers(t, q, v, lambda);
+    }
+}
+
+impl<Y: Reducible> Touching for ModeTable<Y> {
+    type PerContact<T: Copy + core::fmt::Debug> = Vec<T>;
+    type Delassus = Vec<Y::Scalar>;
+
+    fn contacts(&self) -> &[Contact<Y::Scalar>] {
+        &self.contacts
+    }
+
+    fn per_contact<T: Copy + core::fmt::Debug>(&self, value: T) -> Vec<T> {
+        vec![value; self.contacts.len()]
+    }
+
+    fn zero_delassus(&self, len: usize) -> Vec<Y::Scalar> {
+        vec![Scalar::zero(); len]
+    }
+
+    fn act(&mut self, modes: &[Mode]) {
+        let before = self.current;
+        self.current = match self.modes.iter().position(|(known, _)| known == modes) {
+            Some(k) => k,
+            None => {
+                let made = self.full.acting(&acting(self.full.rows().len(), &self.contacts, modes));
+                self.modes.push((modes.to_vec(), made));
+                self.modes.len() - 1
+            }
+        };
+        if self.current != before {
+            let (low, high) = (before.min(self.current), before.max(self.current));
+            let (first, rest) = self.modes.split_at_mut(high);
+            let [a, b] = [&mut first[low].1, &mut rest[0].1];
+            a.swap_inputs(b);
+        }
+    }
+
+    fn gaps(
+        &mut self,
+        _t: Y::Scalar,
+        q: &Y::Coordinates,
+        v: &Y::Momenta,
+        gaps: &mut Y::Rows,
+        velocities: &mut Y::Rows,
+        entries: &mut Y::Entries,
+    ) {
+        let current = &mut self.modes[self.current].1;
+        self.full.swap_inputs(current);
+        self.full.gaps(q, v, gaps, velocities, entries);
+        self.full.swap_inputs(current);
+    }
+}
