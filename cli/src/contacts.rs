@@ -38,6 +38,8 @@ pub struct Touched {
     pub contacts: ContactStatistics,
     /// The contacts that are closed at the end.
     pub closed: Vec<(usize, Mode)>,
+    /// The sets of modes that were visited, and the time that was spent in each, s.
+    pub visits: Vec<(Vec<Mode>, f64)>,
     /// Computing time, s.
     pub seconds: f64,
 }
@@ -46,6 +48,7 @@ pub struct Touched {
 struct Observer {
     record: Record,
     events: Vec<ContactEvent<f64>>,
+    visits: Vec<(Vec<Mode>, f64)>,
     every: f64,
     time: f64,
     q: Vec<f64>,
@@ -83,7 +86,11 @@ impl Observer {
 
 impl ContactObserver<Mechanism> for Observer {
     fn stretch(&mut self, system: &mut System, stretch: &mut dyn Stretch<Mechanism>) {
-        let [_, end] = stretch.span();
+        let [begin, end] = stretch.span();
+        match self.visits.iter_mut().find(|(modes, _)| modes == system.modes()) {
+            Some((_, time)) => *time += end - begin,
+            None => self.visits.push((system.modes().to_vec(), end - begin)),
+        }
         while self.next() <= end && self.record.t.last().is_some_and(|last| *last < self.time) {
             let t = self.next();
             let (mut q, mut p) = (std::mem::take(&mut self.q), std::mem::take(&mut self.p));
@@ -131,8 +138,15 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let mut system = WithContacts::new(mechanism);
     let method = method(settings, &system)?;
     let failed = |e: HybridError| failure(plan, &e);
-    let mut observer =
-        Observer { record: Record::default(), events: Vec::new(), every: settings.every, time: settings.time, q, p };
+    let mut observer = Observer {
+        record: Record::default(),
+        events: Vec::new(),
+        visits: Vec::new(),
+        every: settings.every,
+        time: settings.time,
+        q,
+        p,
+    };
     let clock = Instant::now();
     observer.row(&mut system, 0.0);
     let (q, p) = (observer.q.clone(), observer.p.clone());
@@ -143,10 +157,18 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     Ok(Touched {
         record: Record { statistics, ..observer.record },
         events: observer.events,
+        visits: observer.visits,
         contacts: *motion.contact_statistics(),
         closed: modes.filter(|(_, mode)| *mode != Mode::Open).collect(),
         seconds: clock.elapsed().as_secs_f64(),
     })
+}
+
+/// What computed the steps.
+pub fn ways(touched: &Touched) -> String {
+    let [_, _, compiled, interpreted] = touched.contacts.steps;
+    let sets = touched.visits.len();
+    format!("{compiled} steps by machine code, {interpreted} by the interpreter, {sets} sets of modes")
 }
 
 /// The failure of a run: the contact by its name.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::io::Write;
+use std::path::Path;
 
 use multibody::codegen::generate::quantity;
 use multibody::codegen::generate::trace;
@@ -17,7 +18,7 @@ use super::args::CountArgs;
 use super::generate;
 use super::output::mentioned;
 use super::rivals::{chain_of_pins, RIVALS};
-use super::{source, Outcome};
+use super::{modes, source, Outcome};
 
 /// Operation counts of one output.
 pub struct OutputCounts {
@@ -82,6 +83,11 @@ struct Part {
 pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
     let Chosen { plan, candidates: tried } = source::chosen(&args.model, args.code.plan_options())?;
     let options = args.code.options(&plan.model.name).of_model(!plan.constraints.is_empty());
+    if let Some(argument) = &args.modes {
+        let choice = Some(modes::choice(argument, Path::new(""), &plan.model)?);
+        let options = Options { modes: choice, ..options }.of_model(true);
+        return mentioned("making the code of every set of modes", || modes::count(&plan, &options, out));
+    }
     let counts = mentioned("counting the operations of every output", || all(&plan, &options))?;
     let parts = match options.outputs.first() {
         Some(&group) => mentioned("counting what parts of the scene cost", || parts(&plan, &options, group))?,

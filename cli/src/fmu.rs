@@ -35,7 +35,7 @@ pub fn run(args: &GenerateArgs) -> Outcome {
         let what = format!("an FMU cannot keep the loops and couplings of `{}` closed", model.name);
         return Err(Failure::new(what, "model exchange has no projection of states: use generated Rust or C"));
     }
-    let unit = c::fmu(&model, &options(args, &model)).map_err(failure)?;
+    let unit = c::fmu(&model, &options(args, &model)?).map_err(failure)?;
     source::tell_notices(path, &unit.notices);
     let library = library(&unit)?;
     let content = zipped(&unit, library.as_deref())

@@ -10,7 +10,7 @@ use super::args::{GenerateArgs, Language};
 #[cfg(feature = "fmu")]
 use super::fmu;
 use super::output::{write_file, write_files};
-use super::{source, Failure, Outcome};
+use super::{modes, source, Failure, Outcome};
 
 /// Runs `mbd generate`: prints the code or writes it to files.
 pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
@@ -25,7 +25,7 @@ pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
     let webassembly = matches!(args.lang, Language::Wasm | Language::WasmLanes);
     let module = webassembly.then(|| module_file(file)).transpose()?;
     let model = source::model_of(&args.model)?;
-    let base = options(args, &model);
+    let base = options(args, &model)?;
     if let Some(CFiles { source: file, header, name }) = c_files {
         let generated = c::generate(&model, &base, &name).map_err(failure)?;
         source::tell_notices(path, &generated.notices);
@@ -51,9 +51,10 @@ pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
 }
 
 /// Options of the generator.
-pub fn options(args: &GenerateArgs, model: &Model) -> Options {
+pub fn options(args: &GenerateArgs, model: &Model) -> Outcome<Options> {
     let source = shown(&args.model.model);
-    Options { runtime: args.runtime.clone(), source, ..args.code.options(&model.name) }
+    let modes = args.modes.as_deref().map(|modes| modes::choice(modes, Path::new(""), model)).transpose()?;
+    Ok(Options { runtime: args.runtime.clone(), source, modes, ..args.code.options(&model.name) })
 }
 
 /// The two files of C.
@@ -96,6 +97,12 @@ pub fn failure(error: GenerateError) -> Failure {
         GenerateError::OutputNeedsConstraints { .. } | GenerateError::OutputLacksConstraints { .. } => {
             "leave the output out; `mbd generate --help` says which models have it"
         }
+        GenerateError::ModesNeedContacts { .. } => "leave --modes out, or add [[shape]] and [[contact]] to the model",
+        GenerateError::NumberOfModes { .. } | GenerateError::TooManyModes { .. } => {
+            "`mbd simulate MODEL --record-modes FILE` writes the sets that a motion visits; `--modes FILE` takes them"
+        }
+        GenerateError::ModesNeedRust => "leave --modes or --lang out",
+        GenerateError::OutputNeedsContacts { .. } => "add --modes masked",
         _ => "give the bodies behind that joint mass and inertia, or the joint an armature",
     };
     Failure::new(error.to_string(), help)

@@ -18,6 +18,7 @@ mod fmu;
 mod generate;
 mod identifiable;
 mod loops;
+mod modes;
 mod motion;
 mod output;
 mod picture;

@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use multibody::codegen::model::{Coordinate, Unit, Value};
+use multibody::codegen::modes;
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
 use multibody::runtime::catalogue;
@@ -88,6 +89,12 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
         writable(file)?;
     }
     verdict::start(path, &plan, &q)?;
+    if model.contacts.is_empty() && args.record_modes.is_some() {
+        return Err(Failure::new(
+            format!("--record-modes: `{}` has no contacts", model.name),
+            "leave it out, or add [[shape]] and [[contact]] to the model",
+        ));
+    }
     if !model.contacts.is_empty() {
         return with_contacts(args, &plan, (q, v), &settings, (&csv, &svg, &drawing), out);
     }
@@ -165,17 +172,22 @@ fn with_contacts(
     let mut files = vec![(csv, table.as_str()), (svg, plot.as_str()), (beside.as_path(), events.as_str())];
     let motion = args.picture.as_deref().map(|file| (file, picture::svg(plan, record, drawing)));
     files.extend(motion.as_ref().map(|(file, text)| (*file, text.as_str())));
+    let modes = args.record_modes.as_deref().map(|file| (file, modes::text(&plan.model, &touched.visits)));
+    files.extend(modes.as_ref().map(|(file, text)| (*file, text.as_str())));
     write_files(&files)?;
     writeln!(out, "{}", title(plan, settings))?;
     contacts::report(plan, &touched, out)?;
     writeln!(out, "work: {}", work(&record.statistics))?;
     let seconds = touched.seconds;
-    writeln!(out, "time: {seconds:.3} s, {} (interpreter)", pace(args.time / seconds))?;
+    writeln!(out, "time: {seconds:.3} s, {}; {}", pace(args.time / seconds), contacts::ways(&touched))?;
     let (rows, count) = (record.t.len(), touched.events.len());
     writeln!(out, "table: {} ({rows} rows)\nevents: {} ({count} rows)", csv.display(), beside.display())?;
     writeln!(out, "plot: {}", svg.display())?;
     if let Some(file) = &args.picture {
         writeln!(out, "picture: {}", file.display())?;
+    }
+    if let Some(file) = &args.record_modes {
+        writeln!(out, "modes: {} ({} sets)", file.display(), touched.visits.len())?;
     }
     Ok(())
 }

@@ -12,7 +12,7 @@ use serde::Deserialize;
 use super::args::{type_name, DEFAULT_RUNTIME};
 use super::generate::{self, shown};
 use super::output::{note, write_file};
-use super::{source, Failure, Outcome};
+use super::{modes, source, Failure, Outcome};
 
 /// The contents of `manifest.toml`: the files of the directory. Paths are relative to it.
 #[derive(Deserialize)]
@@ -46,6 +46,8 @@ struct Entry {
     frames: Option<Vec<String>>,
     snap: Option<f64>,
     chunk: Option<usize>,
+    /// Modes of contacts: `masked`, `all`, or a file with sets of modes.
+    modes: Option<String>,
 }
 
 const MANIFEST: &str = "manifest.toml";
@@ -93,7 +95,7 @@ fn read(path: &Path) -> Outcome<Manifest> {
 }
 
 const KEYS: &str = "a manifest has `runtime` and [[file]] tables with `file`, `model`, `type`, `outputs`, and perhaps \
-                    `base`, `gravity`, `scalar`, `arithmetic`, `elimination`, `rolled`, `efforts`, `frames`, `snap`, `chunk`";
+                    `base`, `gravity`, `scalar`, `arithmetic`, `elimination`, `rolled`, `efforts`, `frames`, `snap`, `chunk`, `modes`";
 
 /// The text that a file should have.
 fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> Outcome<String> {
@@ -105,6 +107,9 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
     }
     let group = |name: &String| Output::from_name(name).ok_or_else(|| wrong(format!("`{name}` is no output")));
     let default = Options::default();
+    let base = choice("base", &entry.base, Base::from_name).map_err(wrong)?;
+    let model = source::model(&directory.join(&entry.model), &ImportOptions { base, gravity: entry.gravity })?;
+    let modes = entry.modes.as_deref().map(|word| modes::choice(word, directory, &model)).transpose()?;
     let options = Options {
         type_name: type_name(&entry.type_name).map_err(wrong)?,
         outputs: entry.outputs.iter().map(group).collect::<Outcome<_>>()?,
@@ -121,9 +126,8 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
         runtime: runtime.to_string(),
         source: shown(&entry.model),
         chunk: entry.chunk.unwrap_or(default.chunk).max(1),
+        modes,
     };
-    let base = choice("base", &entry.base, Base::from_name).map_err(wrong)?;
-    let model = source::model(&directory.join(&entry.model), &ImportOptions { base, gravity: entry.gravity })?;
     Ok(codegen::generate(&model, &options).map_err(generate::failure)?.source)
 }
 

@@ -2,7 +2,10 @@
 
 use std::collections::BTreeSet;
 
+use mbd_runtime::contact::{rows_that_act, Mode};
+
 use crate::error::GenerateError;
+use crate::modes::{ModeChoice, OF_EACH_SET};
 use crate::options::{Options, Precision};
 use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
@@ -70,6 +73,19 @@ pub struct Programs {
     pub frames: Vec<usize>,
     /// Lengths of all arrays.
     pub sizes: Sizes,
+    /// Programs of the outputs in [`OF_EACH_SET`] for sets of modes of contacts.
+    pub sets: Vec<SetPrograms>,
+}
+
+/// The programs for one set of modes of the contacts.
+#[derive(Clone, Debug)]
+pub struct SetPrograms {
+    /// The mode of each contact.
+    pub modes: Vec<Mode>,
+    /// The plan in which the rows act that act in these modes.
+    pub plan: Plan,
+    /// Programs of outputs.
+    pub outputs: Vec<OutputProgram<Code>>,
 }
 
 impl Programs {
@@ -87,7 +103,31 @@ impl Programs {
             coordinate_rates: rates.then(|| coordinate_rates(plan, options).map(Code::Straight)),
             sizes: sizes(plan, options, frames.len()),
             frames,
+            sets: Vec::new(),
         })
+    }
+
+    /// Traces all of them for a mechanism with contacts: those of the outputs for all modes, where numbers say which rows
+    /// act, and those for sets of modes. `full` is the plan with the rows of the contacts, all of which act.
+    ///
+    /// # Errors
+    /// See [`GenerateError`].
+    pub fn of_modes(full: &Plan, choice: &ModeChoice, options: &Options) -> Result<Programs, GenerateError> {
+        let gaps = |output: &Output| *output == Output::Gaps;
+        let others =
+            Options { outputs: options.outputs.iter().copied().filter(|o| !gaps(o)).collect(), ..options.clone() };
+        let mut programs = Programs::new(&full.masked(), &others)?;
+        for output in options.outputs.iter().filter(|o| gaps(o)) {
+            programs.outputs.push(compile(full, *output, options)?);
+        }
+        let (contacts, rows) = (full.contacts::<f64>(), full.dims.rows);
+        for modes in choice.sets(&full.model)? {
+            let plan = full.acting(&rows_that_act(rows, &contacts, &modes));
+            let wanted = OF_EACH_SET.into_iter().filter(|output| options.outputs.contains(output));
+            let outputs = wanted.map(|output| compile(&plan, output, options)).collect::<Result<_, _>>()?;
+            programs.sets.push(SetPrograms { modes, plan, outputs });
+        }
+        Ok(programs)
     }
 
     /// The programs of all functions.
@@ -97,7 +137,8 @@ impl Programs {
 
     /// Operations of each output.
     pub fn counts(&self, options: &Options) -> Vec<(Output, Counts)> {
-        options.outputs.iter().copied().zip(self.outputs.iter().map(|p| p.program.counts())).collect()
+        let of = |output: &Output| self.outputs.iter().find(|p| p.spec.name == output.name());
+        options.outputs.iter().filter_map(|output| Some((*output, of(output)?.program.counts()))).collect()
     }
 }
 

@@ -34,6 +34,27 @@ pub enum GenerateError {
         /// Name of the model.
         model: String,
     },
+    /// Code for modes of contacts is asked for, and the model has no contacts.
+    ModesNeedContacts {
+        /// Name of the model.
+        model: String,
+    },
+    /// A set of modes has another number of modes than the model has contacts.
+    NumberOfModes {
+        /// Number of contacts.
+        contacts: usize,
+        /// Number of modes in the set.
+        modes: usize,
+    },
+    /// All sets of modes are asked for, and they are too many.
+    TooManyModes {
+        /// Their number.
+        sets: usize,
+        /// Largest number.
+        most: usize,
+    },
+    /// Code for modes of contacts is Rust only.
+    ModesNeedRust,
     /// A number in the code is infinite: a freedom has no inertia, which the checks of the model cannot see where
     /// parameters are involved.
     InfiniteNumber {
@@ -65,6 +86,21 @@ impl fmt::Display for GenerateError {
             GenerateError::OutputNeedsContacts { output, model } => {
                 let name = output.name();
                 write!(f, "`{name}` is an output of mechanisms with contacts, of code for their modes (option `modes`), and this is not such code of `{model}`")
+            }
+            GenerateError::ModesNeedContacts { model } => {
+                write!(f, "code for modes of contacts is asked for, and `{model}` has no contacts")
+            }
+            GenerateError::NumberOfModes { contacts, modes } => {
+                write!(
+                    f,
+                    "a set of {modes} modes is listed for {contacts} contacts: there is one mode for each contact"
+                )
+            }
+            GenerateError::TooManyModes { sets, most } => {
+                write!(f, "there are {sets} sets of modes, and at most {most} get code of their own: list those that a motion visits (`mbd modes --record`)")
+            }
+            GenerateError::ModesNeedRust => {
+                write!(f, "code for modes of contacts exists in Rust only")
             }
             GenerateError::InfiniteNumber { output, body: Some(body) } => {
                 write!(f, "`{}` contains an infinite number at body `{body}`: {question}", output.name())

@@ -1,11 +1,14 @@
 //! Generation of Rust code from a model and options. The macro, the command and build scripts all use it.
 
+use mbd_runtime::contact::Mode;
+
 use crate::code::Programs;
 use crate::emit;
 #[doc(hidden)]
 pub use crate::emit::quantity;
 pub use crate::error::GenerateError;
 use crate::model::Model;
+use crate::modes::OF_EACH_SET;
 pub use crate::options::{Arithmetic, Options, Precision, RolledCode};
 pub use crate::output::{InputArray, Output, OutputProgram};
 use crate::plan::Plan;
@@ -21,6 +24,8 @@ pub struct Generated {
     pub source: String,
     /// Operations of each function.
     pub counts: Vec<(Output, Counts)>,
+    /// Sets of modes of contacts that have functions of their own, with operations of each of these.
+    pub sets: Vec<(Vec<Mode>, Vec<(Output, Counts)>)>,
     /// Notices about changes, such as angles that became right angles.
     pub notices: Vec<String>,
 }
@@ -40,7 +45,17 @@ pub fn generate(model: &Model, options: &Options) -> Result<Generated, GenerateE
 /// # Errors
 /// The same as of [`generate`].
 pub fn generate_from(plan: &Plan, options: &Options) -> Result<Generated, GenerateError> {
-    let programs = Programs::new(plan, options)?;
-    let source = emit::source(&emit::Input { plan, options, programs: &programs });
-    Ok(Generated { source, counts: programs.counts(options), notices: plan.notices.clone() })
+    let (plan, programs) = match &options.modes {
+        None => (plan.clone(), Programs::new(plan, options)?),
+        Some(choice) => {
+            let full = plan.with_contacts();
+            (full.masked(), Programs::of_modes(&full, choice, options)?)
+        }
+    };
+    let source = emit::source(&emit::Input { plan: &plan, options, programs: &programs });
+    let sets = programs.sets.iter().map(|set| {
+        let outputs = OF_EACH_SET.into_iter().filter(|output| options.outputs.contains(output));
+        (set.modes.clone(), outputs.zip(set.outputs.iter().map(|p| p.program.counts())).collect())
+    });
+    Ok(Generated { source, counts: programs.counts(options), sets: sets.collect(), notices: plan.notices.clone() })
 }

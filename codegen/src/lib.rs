@@ -15,6 +15,7 @@ mod import;
 pub mod jit;
 mod lower;
 pub mod model;
+pub mod modes;
 mod names;
 pub mod options;
 pub mod output;

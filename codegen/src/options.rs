@@ -1,6 +1,7 @@
 //! Options of the generator.
 
 use crate::choice::choice;
+use crate::modes::ModeChoice;
 use crate::output::{Output, Search};
 
 choice! {
@@ -124,6 +125,8 @@ pub struct Options {
     pub chunk: usize,
     /// Whether operations may be rewritten.
     pub arithmetic: Arithmetic,
+    /// The modes of contacts for which code is made; without them, contacts are no part of the code.
+    pub modes: Option<ModeChoice>,
 }
 
 impl Options {
@@ -132,12 +135,17 @@ impl Options {
     /// those that they lack.
     pub fn of_model(&self, constrained: bool) -> Options {
         let mut options = self.clone();
+        // Contacts are constraints.
+        let constrained = constrained || self.modes.is_some();
         let mut asked: Vec<Output> = self.outputs.clone();
         asked.sort_unstable();
         let unchosen = asked == Output::DEFAULT || Output::available(false).eq(asked);
         if constrained && unchosen {
             options.outputs.retain(|output| output.spec().available(true));
             options.outputs.extend(Output::available(true).filter(|output| !output.spec().available(false)));
+        }
+        if self.modes.is_some() && !options.outputs.contains(&Output::Gaps) {
+            options.outputs.push(Output::Gaps);
         }
         options
     }
@@ -166,6 +174,7 @@ impl Default for Options {
             source: String::new(),
             chunk: 1000,
             arithmetic: Arithmetic::default(),
+            modes: None,
         }
     }
 }

@@ -44,13 +44,28 @@ pub struct Args {
     pub gravity: Option<[f64; 3]>,
     /// Frames by name.
     pub frames: Vec<(String, Place)>,
+    /// Modes of contacts for which code is made.
+    pub modes: Option<(Modes, Place)>,
     /// Options that are passed to the generator unchanged.
     pub options: Options,
     /// Path of the runtime crate.
     pub runtime: Option<TokenStream>,
 }
 
-const KEYS: [&str; 15] = [
+/// Modes of contacts for which code is made.
+#[derive(Clone, Debug)]
+pub enum Modes {
+    /// In one set of functions.
+    Masked,
+    /// All sets of modes.
+    All,
+    /// Sets of modes in a file.
+    Recorded(String),
+    /// Sets of modes as text: one on each line.
+    Listed(String),
+}
+
+const KEYS: [&str; 16] = [
     "path",
     "name",
     "outputs",
@@ -63,6 +78,7 @@ const KEYS: [&str; 15] = [
     "efforts",
     "frames",
     "snap",
+    "modes",
     "toml",
     "urdf",
     "runtime",
@@ -169,6 +185,7 @@ impl Args {
             "gravity" => self.gravity = Some(gravity(value)?),
             "efforts" => self.options.efforts = choice("efforts", value, &[("true", true), ("false", false)])?,
             "frames" => self.frames = frames(value)?,
+            "modes" => self.modes = Some((modes(value)?, place(value))),
             "snap" => match number(value) {
                 Some(x) if x >= 0.0 => self.options.plan.snap = x,
                 _ => {
@@ -305,6 +322,35 @@ fn frames(value: &[TokenTree]) -> Result<Vec<(String, Place)>, Message> {
         chosen.push((name, place(&element)));
     }
     Ok(chosen)
+}
+
+/// `masked`, `all`, `recorded("file")` or `["open", "stick"]`.
+fn modes(value: &[TokenTree]) -> Result<Modes, Message> {
+    let help =
+        "write `modes = masked`, `modes = all`, `modes = recorded(\"robot.modes\")` with a file that `mbd simulate \
+                --record-modes` writes, or `modes = [\"open open\", \"stick open\"]` with a word for each contact";
+    let wrong = || Message::new(place(value), "`modes` cannot be read", help);
+    match value {
+        [TokenTree::Ident(word)] if *word == "masked" => Ok(Modes::Masked),
+        [TokenTree::Ident(word)] if *word == "all" => Ok(Modes::All),
+        [TokenTree::Ident(word), TokenTree::Group(g)] if *word == "recorded" => {
+            let tokens = visible(g.stream());
+            let path = match tokens.as_slice() {
+                [TokenTree::Literal(l)] => literal::string(&l.to_string()),
+                _ => None,
+            };
+            path.map(Modes::Recorded).ok_or_else(wrong)
+        }
+        [TokenTree::Group(g)] if g.delimiter() == Delimiter::Bracket => {
+            let line = |element: &Vec<TokenTree>| match element.as_slice() {
+                [TokenTree::Literal(l)] => literal::string(&l.to_string()),
+                _ => None,
+            };
+            let lines: Option<Vec<String>> = segments(visible(g.stream())).iter().map(line).collect();
+            lines.map(|lines| Modes::Listed(lines.join("\n"))).ok_or_else(wrong)
+        }
+        _ => Err(wrong()),
+    }
 }
 
 fn number(value: &[TokenTree]) -> Option<f64> {

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use mbd_codegen::diag::{Diagnostic, Severity};
 use mbd_codegen::model::Model;
+use mbd_codegen::modes::{parse, ModeChoice};
 use mbd_codegen::read::{load, Base, ImportOptions};
 use mbd_codegen::words::{closest, did_you_mean, list, quote};
 use mbd_codegen::{generate, Output};
 use proc_macro2::{Group as Tokens, Ident, Literal, Span, TokenStream, TokenTree};
 
-use crate::args::{self, Args, Name, Source};
+use crate::args::{self, Args, Modes, Name, Source};
 use crate::message::{Message, Place};
 use crate::stub;
 
@@ -28,6 +29,11 @@ pub fn expand(input: TokenStream) -> TokenStream {
         let (read, findings) = text.load(&args);
         model = read;
         judge(text, &findings, model.as_ref(), &mut args, &mut errors);
+        if let (Some((modes, place)), Some(model)) = (args.modes.clone(), model.as_ref()) {
+            let (choice, file) = modes_of(&modes, place, model, &mut errors);
+            args.options.modes = choice;
+            watched.extend(file.as_deref().map(tracked));
+        }
         watched.extend(text.tracked());
         watched.extend(text.warnings(&findings));
     }
@@ -135,9 +141,7 @@ impl Text {
 
     /// Makes the compiler read the file again when it changes.
     fn tracked(&self) -> TokenStream {
-        let path = self.file.as_deref().and_then(Path::to_str).map(|p| Literal::string(p).to_string());
-        let text = path.map(|p| format!("const _: &[u8] = ::core::include_bytes!({p});"));
-        text.and_then(|t| t.parse().ok()).unwrap_or_default()
+        self.file.as_deref().map(tracked).unwrap_or_default()
     }
 
     /// A macro cannot issue warnings; the use of a deprecated item is a warning with a text.
@@ -158,6 +162,49 @@ impl Text {
             }));
         }
         out
+    }
+}
+
+/// Makes the compiler read a file again when it changes.
+fn tracked(file: &Path) -> TokenStream {
+    let path = file.to_str().map(|p| Literal::string(p).to_string());
+    let text = path.map(|p| format!("const _: &[u8] = ::core::include_bytes!({p});"));
+    text.and_then(|t| t.parse().ok()).unwrap_or_default()
+}
+
+/// The modes of contacts that an argument asks for, and the file that states them.
+fn modes_of(
+    modes: &Modes,
+    place: Place,
+    model: &Model,
+    errors: &mut Vec<Message>,
+) -> (Option<ModeChoice>, Option<PathBuf>) {
+    let (text, name, file) = match modes {
+        Modes::Masked => return (Some(ModeChoice::Masked), None),
+        Modes::All => return (Some(ModeChoice::All), None),
+        Modes::Listed(text) => (text.clone(), "set", None),
+        Modes::Recorded(path) => {
+            let file = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from).unwrap_or_default().join(path);
+            match std::fs::read_to_string(&file) {
+                Ok(text) => (text, path.as_str(), Some(file)),
+                Err(error) => {
+                    let message = format!("cannot read {}: {error}", quote(path));
+                    errors.push(Message::new(place, message, similar_file(&file, path)));
+                    return (None, None);
+                }
+            }
+        }
+    };
+    match parse(&text, model) {
+        Ok(sets) => (Some(ModeChoice::Listed(sets)), file),
+        Err(wrong) => {
+            for (line, what) in wrong {
+                let at = if file.is_some() { format!("{name}:{line}") } else { format!("{name} {line}") };
+                let help = "a set has a word for each contact, in the order of the model: `open`, `slide` or `stick`";
+                errors.push(Message::new(place, format!("{at}: {what}"), help));
+            }
+            (None, file)
+        }
     }
 }
 

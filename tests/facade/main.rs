@@ -2,6 +2,7 @@
 
 mod batch;
 mod committed;
+mod contacts;
 mod counts;
 mod derivatives;
 mod macro_errors;

@@ -132,6 +132,9 @@ pub struct CountArgs {
     /// Show every elimination that was tried, not only the best of each branch
     #[arg(long)]
     pub candidates: bool,
+    /// Count the code for modes of contacts: `masked`, `all`, or a FILE with sets of modes
+    #[arg(long, value_name = "masked|all|FILE", conflicts_with_all = ["candidates", "json"])]
+    pub modes: Option<String>,
     /// Print JSON
     #[arg(long)]
     pub json: bool,
@@ -314,6 +317,9 @@ pub struct SimulateArgs {
     /// Time from one row of the table to the next, s
     #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "rows")]
     pub every: Option<f64>,
+    /// File to write with the sets of modes of the contacts that the motion visits, for `mbd generate --modes`
+    #[arg(long, value_name = "FILE")]
+    pub record_modes: Option<PathBuf>,
     /// How loops are kept closed
     #[arg(long, value_parser = one_of(HOLD), default_value = "mass")]
     pub hold: Stabilisation,

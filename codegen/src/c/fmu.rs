@@ -44,6 +44,9 @@ pub fn fmu(model: &Model, options: &Options) -> Result<Fmu, GenerateError> {
     let outputs = vec![Output::Rates, Output::Velocities, Output::Energy];
     let options = Options { outputs, precision: Precision::F64, frames: Vec::new(), ..options.clone() };
     let plan = &search::plan(model, options.searches());
+    if options.modes.is_some() {
+        return Err(GenerateError::ModesNeedRust.into());
+    }
     let programs = Programs::new(plan, &options)?;
     let input = Input { plan, options: &options, programs: &programs };
     let prefix = Prefix::new(&options.type_name);

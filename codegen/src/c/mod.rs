@@ -68,6 +68,9 @@ pub fn generate(model: &Model, options: &Options, name: &str) -> Result<Generate
 /// # Errors
 /// The same as of [`generate`].
 pub fn generate_from(plan: &Plan, options: &Options, name: &str) -> Result<GeneratedC, GenerateError> {
+    if options.modes.is_some() {
+        return Err(GenerateError::ModesNeedRust);
+    }
     let programs = Programs::new(plan, options)?;
     let (header, source) = files(&Input { plan, options, programs: &programs }, name);
     Ok(GeneratedC { header, source, counts: programs.counts(options), notices: plan.notices.clone() })

@@ -2,8 +2,10 @@
 
 use std::fmt::Write;
 
+use mbd_runtime::contact::{rows_that_act, Mode};
 use mbd_runtime::tree::Source;
 
+use super::modes::Contacts;
 use super::signature::nested;
 use crate::options::Options;
 use crate::output::{Sizes, FIELDS};
@@ -42,11 +44,20 @@ pub fn fields(plan: &Plan, sizes: &Sizes) -> Vec<Field> {
             "drive_q" => Some(neutral(plan, true)),
             "params" => Some(plan.default_params()),
             "gravity" => Some(vec![0.0, 0.0, -9.81]),
+            // Loops and couplings act, and all contacts are open.
+            "acts" => Some(acting(plan)),
             _ => None,
         };
         Field { name, dims, value, doc: field.doc }
     });
     field.collect()
+}
+
+/// 1 for each row that acts while all contacts are open.
+fn acting(plan: &Plan) -> Vec<f64> {
+    let contacts = plan.contacts::<f64>();
+    let open = vec![Mode::Open; contacts.len()];
+    rows_that_act(plan.dims.rows, &contacts, &open).into_iter().map(|acts| f64::from(u8::from(acts))).collect()
 }
 
 /// The neutral configuration, of the state or of the drives.
@@ -56,17 +67,23 @@ pub fn neutral(plan: &Plan, drives: bool) -> Vec<f64> {
 }
 
 /// The type with its fields, whose entries have type `entry`.
-pub fn type_definition(out: &mut String, ty: &str, fields: &[Field], entry: &str) {
+pub fn type_definition(out: &mut String, ty: &str, fields: &[Field], entry: &str, contacts: Option<&Contacts>) {
     let _ = writeln!(out, "#[derive(Clone, Debug, PartialEq)]\n#[rustfmt::skip]\npub struct {ty} {{");
     for Field { name, dims, doc, .. } in fields {
-        let _ = writeln!(out, "    /// {doc}\n    pub {name}: {},", nested(dims, entry));
+        // The rows that act follow from the modes of contacts.
+        let public = if *name == "acts" { "" } else { "pub " };
+        let _ = writeln!(out, "    /// {doc}\n    {public}{name}: {},", nested(dims, entry));
+    }
+    if let Some(contacts) = contacts {
+        contacts.fields(out);
     }
     let _ = writeln!(out, "}}");
 }
 
 /// The constructor.
-pub fn constructor(out: &mut String, options: &Options, fields: &[Field]) {
-    let values: Vec<String> = fields.iter().map(|field| format!("{}: {}", field.name, field.literal())).collect();
+pub fn constructor(out: &mut String, options: &Options, fields: &[Field], contacts: Option<&Contacts>) {
+    let mut values: Vec<String> = fields.iter().map(|field| format!("{}: {}", field.name, field.literal())).collect();
+    values.extend(contacts.map_or(Vec::new(), Contacts::values));
     let _ = writeln!(
         out,
         "

@@ -42,11 +42,12 @@ impl Head<'_> {
 
     /// Writes the function, and the first line of its kernel.
     pub fn write(&self, out: &mut String, statements: usize) {
-        let (rt, id, name) = (&self.options.runtime, self.id, self.signature.name);
+        let (rt, id, name) = (&self.options.runtime, self.id, &self.signature.name);
+        let public = if self.signature.public { "pub " } else { "" };
         if statements <= INLINED {
             let _ = writeln!(out, "    #[inline]");
         }
-        let _ = writeln!(out, "    pub fn {} {{", self.signature.declaration(self.options.precision.name()));
+        let _ = writeln!(out, "    {public}fn {} {{", self.signature.declaration(self.options.precision.name()));
         let arguments: Vec<String> = self.ports.iter().map(Port::argument).collect();
         let call = match self.chooses() {
             true => format!("{rt}::kernel::call::<Self, {id}, _>({})", tuple(&arguments)),

@@ -71,7 +71,7 @@ fn state(lines: &mut Vec<String>, plan: &Plan) {
 
 /// Rows of the constraints.
 fn constraints(lines: &mut Vec<String>, plan: &Plan) {
-    if plan.constraints.is_empty() {
+    if plan.model.constraints.is_empty() {
         return;
     }
     lines.extend([String::new(), "Constraints (rows; name; what they bind):".to_string()]);

@@ -69,7 +69,7 @@ pub fn lanes_type(out: &mut String, options: &Options, fields: &[Field], kernels
         width(options)
     );
     let lane = format!("[{t}; LANES]");
-    type_definition(out, &format!("{name}Lanes<const LANES: usize>"), fields, &lane);
+    type_definition(out, &format!("{name}Lanes<const LANES: usize>"), fields, &lane, None);
     let _ = writeln!(
         out,
         "

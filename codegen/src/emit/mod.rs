@@ -5,6 +5,7 @@ pub(crate) mod fields;
 pub(crate) mod head;
 pub(crate) mod header;
 mod lanes;
+mod modes;
 pub(crate) mod names;
 pub(crate) mod numbers;
 mod rolled;
@@ -16,9 +17,10 @@ use std::fmt::Write;
 
 use crate::code::{Code, Programs};
 use crate::options::Options;
-use crate::output::{Output, OutputProgram};
+use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
 use head::Head;
+use modes::Contacts;
 use signature::Signature;
 
 pub use names::quantity;
@@ -40,7 +42,9 @@ pub fn source(input: &Input) -> String {
     let mut out = String::new();
     let rates = options.outputs.contains(&Output::Rates);
     let fields = fields::fields(plan, &programs.sizes);
-    for line in header::lines(input) {
+    let contacts = Contacts::new(plan, options, programs);
+    let of_contacts = contacts.as_ref().map_or(Vec::new(), Contacts::lines);
+    for line in header::lines(input).into_iter().chain(of_contacts) {
         let _ = writeln!(out, "{}", format!("// {line}").trim_end());
     }
     out.push('\n');
@@ -51,41 +55,94 @@ pub fn source(input: &Input) -> String {
         plan.model.name,
         outputs.join(", ")
     );
-    fields::type_definition(&mut out, &options.type_name, &fields, options.precision.name());
+    fields::type_definition(&mut out, &options.type_name, &fields, options.precision.name(), contacts.as_ref());
     let _ = writeln!(
         out,
         "\n#[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]\n#[rustfmt::skip]\nimpl {} {{",
         options.type_name
     );
     constants::write(&mut out, &constants::constants(input), options);
-    fields::constructor(&mut out, options, &fields);
-    let functions = programs.functions();
-    let signatures: Vec<Signature> = functions.iter().map(|p| Signature::new(p.spec, &programs.sizes)).collect();
-    let kernels = functions.iter().zip(&signatures).enumerate().map(|(id, (program, signature))| {
+    if let Some(contacts) = &contacts {
+        contacts.constants(&mut out);
+    }
+    fields::constructor(&mut out, options, &fields, contacts.as_ref());
+    let functions = functions(input, contacts.as_ref());
+    let signatures: Vec<Signature> = functions.iter().map(|f| f.signature(&programs.sizes)).collect();
+    let kernels = functions.iter().zip(&signatures).enumerate().map(|(id, (function, signature))| {
+        let program = function.program;
         let ports = signature.ports(&program.inputs, &program.program.used_inputs());
         lanes::Kernel { id, signature, ports }
     });
     let kernels: Vec<lanes::Kernel> = kernels.collect();
-    for (program, kernel) in functions.iter().zip(&kernels) {
-        function(&mut out, plan, options, program, kernel);
+    for (function, kernel) in functions.iter().zip(&kernels) {
+        if let (Some(contacts), true) = (&contacts, function.first) {
+            contacts.dispatch(&mut out, &Signature::new(function.program.spec, &programs.sizes));
+        }
+        write_function(&mut out, function.plan, options, function.program, kernel);
     }
-    fields::broadcast(&mut out, options, &fields);
-    if rates {
+    // Several states would have to be in the same modes of contacts.
+    let lanes = contacts.is_none();
+    if lanes {
+        fields::broadcast(&mut out, options, &fields);
+    }
+    if rates && lanes {
         lanes::batch(&mut out, plan, options, &kernels);
     }
     let _ = writeln!(out, "}}");
     lanes::kernels(&mut out, options, &kernels);
-    lanes::lanes_type(&mut out, options, &fields, &kernels);
+    if lanes {
+        lanes::lanes_type(&mut out, options, &fields, &kernels);
+    }
     fields::default(&mut out, "", &options.type_name);
     traits::traits(&mut out, plan, options, &kernels);
-    if rates {
+    if rates && lanes {
         lanes::batch_trait(&mut out, plan, options);
+    }
+    if let Some(contacts) = &contacts {
+        contacts.touching(&mut out, plan);
     }
     out
 }
 
+/// A function of the type.
+struct Function<'a> {
+    program: &'a OutputProgram<Code>,
+    plan: &'a Plan,
+    /// Its name, where it is the part of an output.
+    part: Option<String>,
+    /// Whether it is the first part of its output.
+    first: bool,
+}
+
+impl Function<'_> {
+    fn signature(&self, sizes: &Sizes) -> Signature {
+        let whole = Signature::new(self.program.spec, sizes);
+        match &self.part {
+            None => whole,
+            Some(name) => whole.part(name.clone()),
+        }
+    }
+}
+
+/// All functions, in order.
+fn functions<'a>(Input { plan, programs, .. }: &Input<'a>, contacts: Option<&Contacts>) -> Vec<Function<'a>> {
+    let mut functions = Vec::new();
+    for program in programs.functions() {
+        let part = contacts.and_then(|contacts| contacts.for_all_modes(program.spec.name));
+        let first = part.is_some();
+        functions.push(Function { program, plan, part, first });
+    }
+    for (k, set) in programs.sets.iter().enumerate() {
+        functions.extend(set.outputs.iter().map(|program| {
+            let part = Some(Contacts::for_set(program.spec.name, k));
+            Function { program, plan: &set.plan, part, first: false }
+        }));
+    }
+    functions
+}
+
 /// One function and its kernel.
-fn function(
+fn write_function(
     out: &mut String,
     plan: &Plan,
     options: &Options,

@@ -48,7 +48,7 @@ impl<'a> RolledWriter<'a> {
 
     /// Function, kernel and tables.
     pub fn write(&self, out: &mut String) {
-        let (name, rt) = (self.head.signature.name, &self.head.options.runtime);
+        let (name, rt) = (&self.head.signature.name, &self.head.options.runtime);
         self.head.write(out, usize::MAX);
         if self.one_by_one {
             let ports: String = self.head.ports.iter().map(|p| format!(", {}", p.name)).collect();

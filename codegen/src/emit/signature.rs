@@ -89,7 +89,9 @@ impl Port {
 /// A generated function, printed as `fn NAME(&self, ARGUMENTS) -> RETURNED`.
 pub struct Signature {
     /// Name of the function.
-    pub name: &'static str,
+    pub name: String,
+    /// Whether it is part of the type's interface; otherwise another function calls it.
+    pub public: bool,
     /// Lines of its documentation.
     pub doc: Vec<&'static str>,
     /// Arguments after `&self`, in order.
@@ -111,7 +113,12 @@ impl Signature {
                 None
             }
         };
-        Signature { name: spec.name, doc: spec.doc().collect(), arguments, returned }
+        Signature { name: spec.name.to_string(), public: true, doc: spec.doc().collect(), arguments, returned }
+    }
+
+    /// The same under another name, called by the function of the output.
+    pub fn part(self, name: String) -> Signature {
+        Signature { name, public: false, ..self }
     }
 
     /// Documentation, line by line.

@@ -22,12 +22,13 @@ struct Writer<'a> {
     v: String,
 }
 
-/// An item of an implementation.
-fn alias(name: &str, ty: &str) -> String {
+/// An associated type of an implementation.
+pub fn alias(name: &str, ty: &str) -> String {
     format!("    type {name} = {ty};\n")
 }
 
-fn method(signature: &str, body: &str) -> String {
+/// A function of an implementation.
+pub fn method(signature: &str, body: &str) -> String {
     format!("\n    #[inline]\n    fn {signature} {{\n        {body}\n    }}\n")
 }
 
@@ -40,13 +41,18 @@ impl Writer<'_> {
 
 /// All implementations for which the type has the functions; none without the rates.
 pub fn traits(out: &mut String, plan: &Plan, options: &Options, kernels: &[Kernel]) {
+    let modes = options.modes.is_some();
     let t = options.precision.name();
     let [q, v] = [plan.dims.nq, plan.dims.nv].map(|n| format!("[{t}; {n}]"));
     let mut writer = Writer { out, options, t, q, v };
     let has = |output| options.outputs.contains(&output);
     let of_constraints =
         [Output::ConstraintResiduals, Output::ProjectMomenta, Output::PositionCorrection, Output::Multipliers];
-    let Some(rates) = kernels.iter().find(|k| k.signature.name == Output::Rates.name()) else { return };
+    if !has(Output::Rates) {
+        return;
+    }
+    // Several states would have to be in the same modes.
+    let rates = kernels.iter().find(|k| !modes && k.signature.name == Output::Rates.name());
     writer.system(plan, rates);
     if has(Output::Momenta) {
         writer.conjugate();
@@ -66,7 +72,7 @@ pub fn traits(out: &mut String, plan: &Plan, options: &Options, kernels: &[Kerne
 }
 
 impl Writer<'_> {
-    fn system(&mut self, plan: &Plan, rates: &Kernel) {
+    fn system(&mut self, plan: &Plan, rates: Option<&Kernel>) {
         let (rt, Writer { t, q, v, .. }) = (&self.options.runtime, &*self);
         let joints = plan.slots.iter().filter_map(|s| {
             let Some(Source::State { q, v }) = s.at else { return None };
@@ -90,7 +96,7 @@ impl Writer<'_> {
                 &format!("rates_at(&mut self, _t: {t}, q: &{q}, p: &{v}, qd: &mut {q}, pd: &mut {v})"),
                 "Self::rates(self, q, p, qd, pd);",
             ),
-            self.rates_in_lanes(plan, rates),
+            rates.map_or_else(String::new, |rates| self.rates_in_lanes(plan, rates)),
             method(
                 &format!("part_name(&self, part: {part}) -> Option<&str>"),
                 &format!(

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use mbd_runtime::contact::Reducible;
+use mbd_runtime::contact::{Reducible, Way};
 use mbd_runtime::Interpreter;
 
 use super::instructions::INPUTS;
@@ -199,6 +199,14 @@ impl<S: Number> Compiled<S> {
         self.shared.output(output).map(|_| ()).map_err(CompileError::clone)
     }
 
+    /// Length of the machine code of an output, bytes; it is compiled if it was not yet.
+    ///
+    /// # Errors
+    /// [`CompileError`].
+    pub fn code_size(&self, output: Output) -> Result<usize, CompileError> {
+        self.shared.output(output).map(MachineCode::size).map_err(CompileError::clone)
+    }
+
     /// Computes an output: its arguments and results are those of the generated function ([`Output::spec`]), as flat
     /// slices.
     ///
@@ -311,6 +319,15 @@ impl<S: Number> Reducible for Compiled<S> {
         Reducible::swap_inputs(&mut self.interpreter, &mut other.interpreter);
     }
 
+    fn way(&self) -> Way {
+        let compiled = !self.interpreted && self.calls.get(Output::Rates as usize).is_none_or(|n| *n >= self.patience);
+        if compiled && self.shared.outputs[Output::Rates as usize].get().is_some_and(Result::is_ok) {
+            Way::Compiled
+        } else {
+            Way::Interpreted
+        }
+    }
+
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
         if !self.run(Output::Gaps, [q, v, &[]], &mut [gaps, velocities, entries]) {
             self.interpreter.gaps(q, v, gaps, velocities, entries);
@@ -350,7 +367,7 @@ fn call<S: Number>(
     let Interpreter { tau, drive_q, drive_v, drive_a, wrenches, gravity, .. } = inputs;
     let gravity = if code.reads_gravity() { &gravity[..] } else { &[] };
     let given: [&[S]; INPUTS] =
-        [a, b, c, tau, drive_q, drive_v, drive_a, wrenches.as_flattened(), params, gravity, acts];
+        [a, b, c, tau, drive_q, drive_v, drive_a, wrenches.as_flattened(), params, acts, gravity];
     code.call(&given, results, scratch);
 }
 

@@ -108,6 +108,8 @@ pub struct MachineCode<S> {
     results: (usize, [usize; RESULTS]),
     /// Length of the working memory.
     scratch: usize,
+    /// Length of the code, bytes.
+    size: usize,
     /// Constants that the code reads.
     constants: Box<[S]>,
     /// Tables of rolled code, at addresses that are part of the code.
@@ -162,6 +164,7 @@ impl<S: Number> MachineCode<S> {
         write(&mut function, program, &shape);
         let mut context = Context::for_function(function);
         module.define_function(id, &mut context).map_err(CompileError::machine)?;
+        let size = context.compiled_code().map_or(0, |code| code.code_info().total_size as usize);
         module.finalize_definitions().map_err(CompileError::machine)?;
         let code = module.get_finalized_function(id);
         // SAFETY: the function was made with this signature, for the calling convention of the host.
@@ -179,9 +182,15 @@ impl<S: Number> MachineCode<S> {
             inputs,
             results,
             scratch: memory.len(),
+            size,
             constants: numbers(constants.into_keys().map(f64::from_bits).collect()),
             _tables: tables,
         })
+    }
+
+    /// Length of the code, bytes.
+    pub fn size(&self) -> usize {
+        self.size
     }
 
     /// Length of the working memory that a call needs.

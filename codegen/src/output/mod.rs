@@ -34,8 +34,8 @@ pub const FIELDS: [Field; 8] = [
     Field::new("drive_a", &[DriveV], "Prescribed accelerations; they enter accelerations and reactions only."),
     Field::new("wrenches", &[Wrenches, Const(6)], "External wrenches `[force; moment]`, N and N m."),
     Field::new("params", &[Params], "Run-time parameters."),
-    Field::new("gravity", &[Gravity], "Gravity in ground axes, m/s²."),
     Field::new("acts", &[Acts], "1 for each row of the constraints that acts, 0 for one that does not."),
+    Field::new("gravity", &[Gravity], "Gravity in ground axes, m/s²."),
 ];
 
 /// The function that comes with the rates: coordinate rates of given velocities.

@@ -57,7 +57,7 @@ impl<'g> SymbolicInputs<'g> {
         let mut state =
             spec.inputs.iter().map(|array| symbols.array(array, false, sizes)).collect::<Vec<_>>().into_iter();
         let [q, second, third] = [0; 3].map(|_| state.next().unwrap_or_default());
-        let [tau, drive_q, drive_v, drive_a, wrenches, params, gravity, acts] =
+        let [tau, drive_q, drive_v, drive_a, wrenches, params, acts, gravity] =
             FIELDS.map(|field| symbols.array(&field.array, true, sizes));
         let wrenches = wrenches.chunks(6).map(|c| std::array::from_fn(|k| c[k])).collect();
         let gravity = plan.gravity_or(&params, || std::array::from_fn(|k| gravity[k]));

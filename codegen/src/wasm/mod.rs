@@ -90,6 +90,9 @@ pub fn generate_lanes_from(plan: &Plan, options: &Options) -> Result<GeneratedWa
 }
 
 fn files(plan: &Plan, options: &Options, number: Number) -> Result<GeneratedWasm, GenerateError> {
+    if options.modes.is_some() {
+        return Err(GenerateError::ModesNeedRust);
+    }
     let programs = Programs::new(plan, options)?;
     let (input, functions) = (Input { plan, options, programs: &programs }, programs.functions());
     let layout = Layout::new(&input, &functions, number);

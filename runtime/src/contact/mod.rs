@@ -61,6 +61,35 @@ impl<S> Contact<S> {
     }
 }
 
+/// What computes the rates of a mechanism with contacts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Way {
+    /// Code that was generated for the modes of the contacts.
+    Generated,
+    /// Generated code for all modes, where numbers say which rows act.
+    Masked,
+    /// Code that was made for the modes at run time.
+    Compiled,
+    /// The interpreter.
+    Interpreted,
+}
+
+/// Which rows of the constraints act in given modes of the contacts, of a mechanism with `rows` rows: those that are no
+/// contacts' always do.
+#[cfg(feature = "alloc")]
+pub fn rows_that_act<S>(rows: usize, contacts: &[Contact<S>], modes: &[Mode]) -> alloc::vec::Vec<bool> {
+    let mut acts = alloc::vec![true; rows];
+    for (contact, mode) in contacts.iter().zip(modes) {
+        for k in 0..contact.rows() {
+            if let Some(acts) = acts.get_mut(contact.row + k) {
+                *acts = mode.acts(k);
+            }
+        }
+    }
+    acts
+}
+
 /// What a contact does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {

@@ -4,7 +4,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::{Deref, DerefMut};
 
-use super::{Contact, Mode, Touching};
+use super::{rows_that_act, Contact, Mode, Touching, Way};
 use crate::interp::Interpreter;
 use crate::system::{system_within, Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
 use crate::Scalar;
@@ -17,6 +17,9 @@ pub trait Reducible: Constrained<Scalar: Real> + Energetic + Conjugate + Sized {
 
     /// Exchanges its inputs with those of another evaluator of the same mechanism.
     fn swap_inputs(&mut self, other: &mut Self);
+
+    /// What computes its rates.
+    fn way(&self) -> Way;
 
     /// Residuals of all rows, their velocities and the entries of `Φ`: [`Touching::gaps`].
     fn gaps(
@@ -36,6 +39,10 @@ impl<S: Real> Reducible for Interpreter<S> {
 
     fn swap_inputs(&mut self, other: &mut Self) {
         Interpreter::swap_inputs(self, other);
+    }
+
+    fn way(&self) -> Way {
+        Way::Interpreted
     }
 
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
@@ -62,7 +69,7 @@ impl<Y: Reducible> ModeTable<Y> {
     /// From an evaluator whose constraints include the contacts' rows. All contacts are open at first.
     pub fn new(full: Y, contacts: Vec<Contact<Y::Scalar>>) -> Self {
         let open = vec![Mode::Open; contacts.len()];
-        let first = full.acting(&acting(full.rows().len(), &contacts, &open));
+        let first = full.acting(&rows_that_act(full.rows().len(), &contacts, &open));
         ModeTable { full, modes: vec![(open, first)], current: 0, contacts }
     }
 
@@ -80,17 +87,6 @@ impl<Y: Reducible> ModeTable<Y> {
     pub fn set_restitution(&mut self, restitution: Y::Scalar) {
         self.contacts.iter_mut().for_each(|c| c.restitution = restitution);
     }
-}
-
-/// Which rows act.
-fn acting<S>(rows: usize, contacts: &[Contact<S>], modes: &[Mode]) -> Vec<bool> {
-    let mut acts = vec![true; rows];
-    for (contact, mode) in contacts.iter().zip(modes) {
-        for k in 0..contact.rows() {
-            acts[contact.row + k] = mode.acts(k);
-        }
-    }
-    acts
 }
 
 impl<Y: System> Deref for ModeTable<Y> {
@@ -203,12 +199,16 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
         vec![Scalar::zero(); len]
     }
 
+    fn way(&self) -> Way {
+        Reducible::way(&**self)
+    }
+
     fn act(&mut self, modes: &[Mode]) {
         let before = self.current;
         self.current = match self.modes.iter().position(|(known, _)| known == modes) {
             Some(k) => k,
             None => {
-                let made = self.full.acting(&acting(self.full.rows().len(), &self.contacts, modes));
+                let made = self.full.acting(&rows_that_act(self.full.rows().len(), &self.contacts, modes));
                 self.modes.push((modes.to_vec(), made));
                 self.modes.len() - 1
             }

@@ -1,6 +1,6 @@
 //! The trait through which a motion with events uses a mechanism with contacts.
 
-use super::{Contact, Mode};
+use super::{Contact, Mode, Way};
 use crate::constrained::rows::row;
 use crate::system::{Constrained, Real};
 use crate::Scalar;
@@ -22,6 +22,8 @@ pub trait Touching: Constrained<Scalar: Real> {
     fn per_contact<T: Copy + core::fmt::Debug>(&self, value: T) -> Self::PerContact<T>;
     /// Memory for the inverse inertia of the contacts: at least `len` zeros, where `len` is what the solver asks for.
     fn zero_delassus(&self, len: usize) -> Self::Delassus;
+    /// What computes the rates in the modes that were set last.
+    fn way(&self) -> Way;
     /// Sets the modes, one for each contact, by which rows act from now on.
     fn act(&mut self, modes: &[Mode]);
     /// Gaps and their like, whatever acts: residuals of all rows (of a contact's normal row the gap, m or rad, negative

@@ -6,6 +6,8 @@ mod select;
 mod watch;
 
 use super::instant::Touches;
+#[cfg(doc)]
+use super::Way;
 use super::{Certificate, ContactError, Effort, Impact, ImpactOrder, Mode, Touching, WithContacts};
 use crate::error::StepError;
 use crate::integrate::{Limits, Solver, Statistics, Step, Stepper};
@@ -97,6 +99,9 @@ pub struct ContactStatistics {
     pub lost: f64,
     /// Largest relative residual of an impact.
     pub residual: f64,
+    /// Steps, by what computed their rates: code generated for the modes, generated code for all modes, code made at run
+    /// time, the interpreter ([`Way`]).
+    pub steps: [u64; 4],
 }
 
 /// Reason why a motion with contacts cannot go on.
@@ -392,6 +397,7 @@ where
         solver.state(system, &mut start.1, &mut start.2);
         system.note_slip(start.0, &start.1, &start.2);
         solver.advance(system, t_end)?;
+        self.statistics.steps[system.system().way() as usize] += 1;
         let found = self.first_event(system)?;
         let end = found.map_or(Y::Scalar::one(), |found| found.theta);
         observer.stretch(system, &mut LastStep { solver: &mut self.solver, end });
