@@ -69,6 +69,7 @@ pub use mbd_runtime as runtime;
 /// | `efforts = false` | whether joint forces `tau` are inputs | `true` |
 /// | `frames = [tool0, "left-foot"]` | frames and bodies of the outputs that have a result for each frame; asks for `frames` where none of them is named | all |
 /// | `snap = 0.0` | angles this close to right angles become exact, rad | `1e-6` |
+/// | `modes = recorded("robot.modes")` | code for the modes of contacts (`docs/contacts.md`): `masked` for functions in which numbers say which contacts act; beside them functions for `all` sets of modes, for those of a file that `mbd simulate --record-modes` writes, or for those of a list, `["open open", "stick open"]` | contacts are no part of the code |
 /// | `runtime = path::to::mbd_runtime` | the runtime crate | that of this crate |
 ///
 /// # Outputs

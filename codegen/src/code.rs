@@ -113,6 +113,7 @@ impl Programs {
     /// # Errors
     /// See [`GenerateError`].
     pub fn of_modes(full: &Plan, choice: &ModeChoice, options: &Options) -> Result<Programs, GenerateError> {
+        let sets = choice.sets(&full.model)?;
         let gaps = |output: &Output| *output == Output::Gaps;
         let others =
             Options { outputs: options.outputs.iter().copied().filter(|o| !gaps(o)).collect(), ..options.clone() };
@@ -121,7 +122,7 @@ impl Programs {
             programs.outputs.push(compile(full, *output, options)?);
         }
         let (contacts, rows) = (full.contacts::<f64>(), full.dims.rows);
-        for modes in choice.sets(&full.model)? {
+        for modes in sets {
             let plan = full.acting(&rows_that_act(rows, &contacts, &modes));
             let wanted = OF_EACH_SET.into_iter().filter(|output| options.outputs.contains(output));
             let outputs = wanted.map(|output| compile(&plan, output, options)).collect::<Result<_, _>>()?;

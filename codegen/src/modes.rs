@@ -110,7 +110,8 @@ pub fn parse(text: &str, model: &Model) -> Result<Vec<Vec<Mode>>, Vec<(usize, St
             errors.push((k + 1, format!("`{unknown}` is no mode of a contact: they are `open`, `slide` and `stick`")));
         } else if set.len() != model.contacts.len() {
             let (given, contacts) = (set.len(), model.contacts.len());
-            errors.push((k + 1, format!("there are {given} modes for {contacts} contacts of `{}`", model.name)));
+            errors
+                .push((k + 1, format!("`{}` has {contacts} contacts, and the modes of {given} are given", model.name)));
         } else {
             sets.push(set);
         }

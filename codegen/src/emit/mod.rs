@@ -63,7 +63,7 @@ pub fn source(input: &Input) -> String {
     );
     constants::write(&mut out, &constants::constants(input), options);
     if let Some(contacts) = &contacts {
-        contacts.constants(&mut out);
+        contacts.constants(&mut out, plan);
     }
     fields::constructor(&mut out, options, &fields, contacts.as_ref());
     let functions = functions(input, contacts.as_ref());

@@ -98,8 +98,17 @@ impl<'a> Contacts<'a> {
     }
 
     /// Constants: names of the contacts, sets of modes.
-    pub fn constants(&self, out: &mut String) {
+    pub fn constants(&self, out: &mut String, plan: &Plan) {
         let (rt, n) = (&self.options.runtime, self.contacts.len());
+        let turns = plan.tree(&plan.default_params()).turns();
+        let turns: Vec<String> = turns.into_iter().map(|x| literal(x, self.options.precision)).collect();
+        let _ = writeln!(
+            out,
+            "    /// Angle by which bodies turn per unit of each velocity, rad.\n    pub const TURNS: [{}; {}] = [{}];",
+            self.options.precision.name(),
+            turns.len(),
+            turns.join(", ")
+        );
         let _ = writeln!(
             out,
             "    /// Names of the contacts.\n    pub const CONTACTS: [&'static str; {n}] = {:?};",
@@ -132,6 +141,7 @@ impl<'a> Contacts<'a> {
             method(&format!("contacts(&self) -> &[{rt}::contact::Contact<{t}>]"), "&self.contacts"),
             method(&format!("per_contact<{of}>(&self, value: T) -> [T; {n}]"), &format!("[value; {n}]")),
             method(&format!("zero_delassus(&self, _len: usize) -> {}", nested(&[room], t)), &nested(&[room], "0.0")),
+            method(&format!("turns(&self) -> &[{t}]"), "const { &Self::TURNS }"),
             method(
                 &format!("way(&self) -> {rt}::contact::Way"),
                 &format!(

@@ -328,6 +328,10 @@ impl<S: Number> Reducible for Compiled<S> {
         }
     }
 
+    fn turns(&self) -> Vec<S> {
+        self.interpreter.tree().turns()
+    }
+
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
         if !self.run(Output::Gaps, [q, v, &[]], &mut [gaps, velocities, entries]) {
             self.interpreter.gaps(q, v, gaps, velocities, entries);

@@ -21,6 +21,9 @@ pub trait Reducible: Constrained<Scalar: Real> + Energetic + Conjugate + Sized {
     /// What computes its rates.
     fn way(&self) -> Way;
 
+    /// [`Touching::turns`].
+    fn turns(&self) -> Vec<Self::Scalar>;
+
     /// Residuals of all rows, their velocities and the entries of `Φ`: [`Touching::gaps`].
     fn gaps(
         &mut self,
@@ -45,6 +48,10 @@ impl<S: Real> Reducible for Interpreter<S> {
         Way::Interpreted
     }
 
+    fn turns(&self) -> Vec<S> {
+        self.tree().turns()
+    }
+
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
         Interpreter::gaps(self, q, v, gaps, velocities, entries);
     }
@@ -60,6 +67,7 @@ pub struct ModeTable<Y: System> {
     modes: Vec<(Vec<Mode>, Y)>,
     current: usize,
     contacts: Vec<Contact<Y::Scalar>>,
+    turns: Vec<Y::Scalar>,
 }
 
 /// A mechanism with contacts in the interpreter.
@@ -70,7 +78,8 @@ impl<Y: Reducible> ModeTable<Y> {
     pub fn new(full: Y, contacts: Vec<Contact<Y::Scalar>>) -> Self {
         let open = vec![Mode::Open; contacts.len()];
         let first = full.acting(&rows_that_act(full.rows().len(), &contacts, &open));
-        ModeTable { full, modes: vec![(open, first)], current: 0, contacts }
+        let turns = full.turns();
+        ModeTable { full, modes: vec![(open, first)], current: 0, contacts, turns }
     }
 
     /// The sets of modes that were met, in the order in which they were.
@@ -201,6 +210,10 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
 
     fn way(&self) -> Way {
         Reducible::way(&**self)
+    }
+
+    fn turns(&self) -> &[Y::Scalar] {
+        &self.turns
     }
 
     fn act(&mut self, modes: &[Mode]) {

@@ -22,6 +22,9 @@ pub trait Touching: Constrained<Scalar: Real> {
     fn per_contact<T: Copy + core::fmt::Debug>(&self, value: T) -> Self::PerContact<T>;
     /// Memory for the inverse inertia of the contacts: at least `len` zeros, where `len` is what the solver asks for.
     fn zero_delassus(&self, len: usize) -> Self::Delassus;
+    /// Largest angle by which a body can turn against another one per unit of each velocity, rad; zero for translations.
+    /// Steps in which bodies turn far are searched for contacts at more points.
+    fn turns(&self) -> &[Self::Scalar];
     /// What computes the rates in the modes that were set last.
     fn way(&self) -> Way;
     /// Sets the modes, one for each contact, by which rows act from now on.

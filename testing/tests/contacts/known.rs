@@ -262,3 +262,53 @@ fn a_quadruped_that_is_dropped_lands_on_its_feet_and_kneels() {
     // The gaps of the feet stay closed.
     assert!(scene.gaps().iter().step_by(3).take(4).all(|gap| gap.abs() < 1e-11), "{:?}", scene.gaps());
 }
+
+/// A rod without weight that spins fast on a carriage, which drifts slowly towards a wall. No error limits the steps of such a motion; the
+/// wall is hit where a tip reaches it first, `z₀ − v t = L |sin ω t|`.
+#[test]
+fn a_rod_that_spins_freely_does_not_pass_a_wall() {
+    let (length, height, drift, spin) = (0.5, 2.0, 1.0, 300.0);
+    let mut rod = model(
+        r#"
+name = "rod"
+gravity = [0, 0, 0]
+[[body]]
+name = "carriage"
+mass = 1
+inertia = [0.01, 0.01, 0.01]
+[[body]]
+name = "rod"
+mass = 1
+inertia = [0.001, 0.08, 0.08]
+[[joint]]
+name = "height"
+type = "prismatic"
+child = "carriage"
+axis = [0, 0, 1]
+[[joint]]
+name = "spin"
+type = "revolute"
+parent = "carriage"
+child = "rod"
+axis = [0, 1, 0]
+"#,
+    );
+    on_floor(&mut rod, "left", 1, [-length, 0.0, 0.0], 0.0, 0.0, 0.0);
+    on_floor(&mut rod, "right", 1, [length, 0.0, 0.0], 0.0, 0.0, 0.0);
+    let gap = |t: f64| height - drift * t - length * (spin * t).sin().abs();
+    // Stretches in which the rod turns by a thousandth of a radian.
+    let mut t = (height - length) / drift - 0.01;
+    while gap(t) > 0.0 {
+        t += 1e-3 / spin;
+    }
+    let (mut a, mut b) = (t - 1e-3 / spin, t);
+    for _ in 0..60 {
+        let middle = 0.5 * (a + b);
+        (a, b) = if gap(middle) > 0.0 { (middle, b) } else { (a, middle) };
+    }
+    let mut scene = Scene::new(rod, &[height, 0.0], &[-drift, spin]);
+    scene.tolerance = 1e-9;
+    scene.run(a + 1e-3);
+    let event = scene.events.0.first().expect("the rod hits the wall");
+    assert!((event.time - a).abs() < 1e-10, "{} {a}", event.time);
+}

@@ -131,6 +131,13 @@ pub enum HybridError {
         /// Their number.
         events: u32,
     },
+    /// Bodies turn so far in one step that it cannot be searched for contacts.
+    TurnsTooFar {
+        /// Time at which the step begins, s.
+        time: f64,
+        /// Angle, rad: an upper bound.
+        angle: f64,
+    },
     /// Something at an event is not finite.
     NotFinite {
         /// Time, s.
@@ -156,6 +163,10 @@ impl core::fmt::Display for HybridError {
             HybridError::TooManyEvents { time, events } => write!(
                 f,
                 "{events} events follow one another at t = {time} s: loosen the rules (`bounce`, `touching`), or raise `events`"
+            ),
+            HybridError::TurnsTooFar { time, angle } => write!(
+                f,
+                "bodies turn by up to {angle:.1e} rad in the step that begins at t = {time} s: limit the steps to search them for contacts"
             ),
             HybridError::NotFinite { time } => {
                 write!(f, "a state or a force at the event at t = {time} s is not finite: look for a singular configuration")
@@ -232,6 +243,8 @@ pub struct Hybrid<Y: Touching, M> {
     /// Watched functions at the ends of a stretch of a step.
     left: Y::PerContact<Watched<Y::Scalar>>,
     right: Y::PerContact<Watched<Y::Scalar>>,
+    /// Angular velocities at these ends, rad/s: the sum of those of all joints.
+    turning: [Y::Scalar; 2],
     departures: Y::PerContact<Departure<Y::Scalar>>,
     touching: Touches<Y>,
     /// Contacts that are left open whatever their gaps are.
@@ -280,6 +293,7 @@ where
             p: p.clone(),
             left: inner.per_contact(Watched::zero()),
             right: inner.per_contact(Watched::zero()),
+            turning: [zero; 2],
             departures: inner.per_contact(departure),
             touching: Touches::new(inner),
             ignored: inner.per_contact(false),

@@ -7,8 +7,12 @@ use crate::integrate::Stepper;
 use crate::system::Real;
 use crate::Scalar;
 
-/// Number of stretches of a step at whose ends the functions are evaluated.
+/// Number of stretches of a step at whose ends the functions are evaluated, where bodies turn little.
 const STRETCHES: u32 = 4;
+/// Largest number of stretches, and largest angle, rad, by which bodies turn within one: steps in which bodies spin freely
+/// may be many turns long, because no error limits them.
+const MOST_STRETCHES: f64 = 1e6;
+const TURN: f64 = 1.0;
 /// Speed of slip, m/s, below which bodies that slide ever more slowly may come to rest.
 const STANDSTILL: f64 = 1e-10;
 /// How often a stretch is halved in search of a point where a gap is positive, and another function.
@@ -76,6 +80,7 @@ where
         if closed {
             system.loads(t, &self.q, true);
         }
+        self.turning[usize::from(right)] = system.turning();
         let out = if right { &mut self.right } else { &mut self.left };
         for (k, out) in out.as_mut().iter_mut().enumerate() {
             *out = system.watched(k);
@@ -117,13 +122,19 @@ where
         }
         self.sample(system, one, true);
         let (_, h) = self.solver.last_step();
-        if system.modes().iter().all(|mode| *mode == Mode::Open) && self.apart(h) {
-            core::mem::swap(&mut self.left, &mut self.right);
+        let fastest = self.turning[0].to_f64().max(self.turning[1].to_f64());
+        let turn = h.to_f64().abs() * fastest / TURN;
+        if turn < 1.0 && system.modes().iter().all(|mode| *mode == Mode::Open) && self.apart(h) {
+            self.move_on();
             return Ok(None);
         }
+        if !(turn < MOST_STRETCHES) {
+            return Err(HybridError::TurnsTooFar { time: self.solver.last_step().0.to_f64(), angle: turn * TURN });
+        }
+        let stretches = libm::ceil(turn).max(f64::from(STRETCHES)) as u32;
         let mut from = zero;
-        for j in 1..=STRETCHES {
-            let to = Y::Scalar::constant(f64::from(j) / f64::from(STRETCHES));
+        for j in 1..=stretches {
+            let to = Y::Scalar::constant(f64::from(j) / f64::from(stretches));
             self.sample(system, to, true);
             let mut first: Option<Found<Y::Scalar>> = None;
             for k in 0..self.left.as_ref().len() {
@@ -138,7 +149,7 @@ where
             if first.is_some() {
                 return Ok(first);
             }
-            core::mem::swap(&mut self.left, &mut self.right);
+            self.move_on();
             from = to;
         }
         match self.creeps(system) {
@@ -203,6 +214,12 @@ where
         self.touching.take_closed(system);
         self.select(system, t + theta * h)?;
         Ok(self.touching.modes.as_ref() == system.modes())
+    }
+
+    /// Takes the end of a stretch for the start of the next one.
+    fn move_on(&mut self) {
+        core::mem::swap(&mut self.left, &mut self.right);
+        self.turning[0] = self.turning[1];
     }
 
     /// Whether no gap can have closed within a step of `h` s, with twice the speeds at its ends.
@@ -299,6 +316,12 @@ impl<Y: Touching> WithContacts<Y> {
     /// Whether all velocities are rounding errors, after [`WithContacts::look`].
     pub(super) fn at_rest(&self) -> bool {
         self.at.v.as_ref().iter().all(|v| v.to_f64().abs() < 1e-12)
+    }
+
+    /// Largest angular velocity between bodies that the velocities allow, rad/s, after [`WithContacts::look`].
+    fn turning(&self) -> Y::Scalar {
+        let turns = self.system().turns().iter().zip(self.at.v.as_ref());
+        turns.fold(Y::Scalar::zero(), |sum, (turn, v)| sum + *turn * v.abs())
     }
 
     /// Gap of contact `k`, m or rad, after [`WithContacts::look`].
