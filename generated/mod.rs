@@ -23,3 +23,6 @@ pub mod panda;
 
 /// From models/solo12.urdf.
 pub mod solo12;
+
+/// From models/contacts/hopper.toml.
+pub mod hopper;

@@ -47,3 +47,58 @@ fn what_cannot_be_simulated_is_refused() {
     bad(run_in(&folder, &implicit), &["--method radau5: a motion with contacts takes explicit methods only"]);
     assert!(files(&folder).is_empty(), "{:?}", files(&folder));
 }
+
+#[test]
+fn modes_are_recorded_counted_and_generated() {
+    let folder = folder("contacts_modes");
+    let hopper = shipped("hopper");
+    let run = ["simulate", &hopper, "--time", "1", "--record-modes", "hopper.modes"];
+    let output = good(run_in(&folder, &run));
+    assert!(out(&output).contains("modes: hopper.modes (2 sets)"), "{}", out(&output));
+    let recorded = std::fs::read_to_string(folder.join("hopper.modes")).expect("the sets");
+    assert!(recorded.contains("\n# Contacts: landing, leg/lower, leg/upper\nopen open open # "), "{recorded}");
+    let counted = good(run_in(&folder, &["count", &hopper, "--modes", "hopper.modes"]));
+    let counted = out(&counted).to_string();
+    let line =
+        |of: &str| counted.lines().find(|l| l.starts_with(of)).unwrap_or_else(|| panic!("{of}: {counted}")).to_string();
+    let operations = |of: &str| -> usize {
+        let words = line(of);
+        words.split_whitespace().rev().nth(1).and_then(|n| n.parse().ok()).expect("a number")
+    };
+    let rates = |set: &str| operations(&format!("{set:<40}rates "));
+    assert!(rates("open open open") < rates("all, by numbers"), "{counted}");
+    assert!(rates("slide open open") < rates("all, by numbers"), "{counted}");
+    good(run_in(&folder, &["generate", &hopper, "--modes", "hopper.modes", "-o", "hopper.rs"]));
+    let source = std::fs::read_to_string(folder.join("hopper.rs")).expect("the code");
+    assert!(source.contains("contact::Touching for Hopper"), "the code has no contacts");
+    assert!(source.contains("pub const MODES: [[::multibody::runtime::contact::Mode; 3]; 2]"), "not two sets of modes");
+}
+
+#[test]
+fn wrong_modes_are_refused() {
+    let folder = folder("contacts_wrong_modes");
+    let (hopper, quadruped) = (shipped("hopper"), shipped("quadruped"));
+    std::fs::write(folder.join("wrong.modes"), "open open\n\nopen open stuck\n").expect("a file");
+    let wrong = ["generate", &hopper, "--modes", "wrong.modes"];
+    bad(run_in(&folder, &wrong), &["wrong.modes:1: `hopper` has 3 contacts", "wrong.modes:3: `stuck` is no mode"]);
+    bad(run_in(&folder, &["generate", &quadruped, "--modes", "all"]), &["at most 32 get code of their own"]);
+    let c = ["generate", &hopper, "--modes", "all", "--lang", "c", "-o", "hopper.c"];
+    bad(run_in(&folder, &c), &["code for modes of contacts exists in Rust only"]);
+    let pendulum = format!("{ROOT}/models/double_pendulum.toml");
+    bad(run_in(&folder, &["generate", &pendulum, "--modes", "masked"]), &["`double_pendulum` has no contacts"]);
+    let record = ["simulate", &pendulum, "--record-modes", "p.modes"];
+    bad(run_in(&folder, &record), &["--record-modes: `double_pendulum` has no contacts"]);
+    assert_eq!(files(&folder), ["wrong.modes"]);
+}
+
+#[test]
+fn machine_code_and_interpreter_give_the_same_motion() {
+    let tables = [&[][..], &["--interpreted"]].map(|more: &[&str]| {
+        let folder = folder(if more.is_empty() { "contacts_compiled" } else { "contacts_interpreted" });
+        let output = good(run_in(&folder, &[&["simulate", &shipped("hopper"), "--time", "2"], more].concat()));
+        let compiled = !out(&output).contains(" 0 steps by machine code");
+        assert_eq!(compiled, more.is_empty(), "{}", out(&output));
+        std::fs::read_to_string(folder.join("hopper.csv")).expect("a table")
+    });
+    assert_eq!(tables[0], tables[1]);
+}
