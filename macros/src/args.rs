@@ -38,6 +38,8 @@ pub struct Args {
     pub source: Option<(Source, Place)>,
     /// The type.
     pub name: Option<Name>,
+    /// The variant of the description.
+    pub variant: Option<(String, Place)>,
     /// How the root is attached.
     pub base: Option<(Base, Place)>,
     /// Gravity instead of the model's.
@@ -50,9 +52,10 @@ pub struct Args {
     pub runtime: Option<TokenStream>,
 }
 
-const KEYS: [&str; 15] = [
+const KEYS: [&str; 16] = [
     "path",
     "name",
+    "variant",
     "outputs",
     "scalar",
     "arithmetic",
@@ -148,6 +151,7 @@ impl Args {
             "toml" => self.set_source(key, Source::Toml(text(&word, value)?), value)?,
             "urdf" => self.set_source(key, Source::Urdf(text(&word, value)?), value)?,
             "name" => self.name = Some(name(value)?),
+            "variant" => self.variant = Some((text(&word, value)?, place(value))),
             "outputs" => self.options.outputs = outputs(value)?,
             "scalar" => {
                 self.options.precision = choice("scalar", value, &Precision::ALL.map(|p| (p.name(), p)))?;
@@ -209,6 +213,7 @@ fn text(key: &str, value: &[TokenTree]) -> Result<String, Message> {
             "path" => {
                 "write the path itself, relative to the folder of Cargo.toml: `path = \"models/arm.toml\"`".to_string()
             }
+            "variant" => "write the name of a `[[variant]]` of the description: `variant = \"docked\"`".to_string(),
             _ => format!("write the description itself, `{key} = r#\"...\"#`, or name its file with `path`"),
         };
         Message::new(place(value), format!("`{key}` has to be a string literal"), help)

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use mbd_codegen::diag::{Diagnostic, Severity};
 use mbd_codegen::model::Model;
-use mbd_codegen::read::{load, Base, ImportOptions};
+use mbd_codegen::read::{chosen, load_all, Base, ImportOptions, Variant};
 use mbd_codegen::words::{closest, did_you_mean, list, quote};
 use mbd_codegen::{generate, Output};
 use proc_macro2::{Group as Tokens, Ident, Literal, Span, TokenStream, TokenTree};
@@ -26,7 +26,11 @@ pub fn expand(input: TokenStream) -> TokenStream {
     let mut model = None;
     if let Some(text) = &text {
         let (read, findings) = text.load(&args);
-        model = read;
+        model = read.and_then(|(model, variants)| {
+            let (name, place) = args.variant.as_ref().map_or((None, text.place), |(name, place)| (Some(name), *place));
+            let chosen = chosen(model, variants, name.map(String::as_str));
+            chosen.map_err(|(message, help)| errors.push(Message::new(place, message, help))).ok()
+        });
         judge(text, &findings, model.as_ref(), &mut args, &mut errors);
         watched.extend(text.tracked());
         watched.extend(text.warnings(&findings));
@@ -125,11 +129,11 @@ impl Text {
         (format!("{at}{}", d.message), d.help.clone())
     }
 
-    fn load(&self, args: &Args) -> (Option<Model>, Vec<Diagnostic>) {
+    fn load(&self, args: &Args) -> (Option<(Model, Vec<Variant>)>, Vec<Diagnostic>) {
         let base = args.base.map_or(Base::default(), |(base, _)| base);
         // This is reported at the argument itself.
         let base = if self.is_toml() { Base::default() } else { base };
-        let (model, findings) = load(&self.label, &self.text, &ImportOptions { base, gravity: args.gravity });
+        let (model, findings) = load_all(&self.label, &self.text, &ImportOptions { base, gravity: args.gravity });
         (model, findings.0)
     }
 
