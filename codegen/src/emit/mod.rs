@@ -11,6 +11,7 @@ mod rolled;
 mod signature;
 mod straight;
 mod traits;
+pub(crate) mod transfer;
 
 use std::fmt::Write;
 
