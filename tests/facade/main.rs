@@ -8,3 +8,4 @@ mod macro_errors;
 pub mod macro_model;
 mod mechanisms;
 mod reference;
+mod variants;
