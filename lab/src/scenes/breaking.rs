@@ -48,6 +48,8 @@ pub struct Breaking {
 pub struct State<S> {
     /// Time, s.
     pub t: f64,
+    /// The number of steps that led here.
+    pub steps: u64,
     /// Coordinates: rad; of the planar joint m, m, rad.
     pub q: Vec<S>,
     /// Conjugate momenta.
@@ -224,7 +226,7 @@ impl Breaking {
         let mut old: Interpreter<S> = self.whole.default_interpreter();
         let mut new: Interpreter<S> = self.broken.default_interpreter();
         let q = self.whole.start().into_iter().map(S::constant).collect();
-        let mut state = State { t: 0.0, q, p: old.zero_momenta() };
+        let mut state = State { t: 0.0, steps: 0, q, p: old.zero_momenta() };
         seen(false, &mut old, &state);
         advance(&mut old, &mut state, times[0], step, &method, |i, state| seen(false, i, state))?;
         let mut v = old.zero_momenta();
@@ -232,7 +234,7 @@ impl Breaking {
         let [q, v] = carry(&mut old, &state.q, &v, &mut new).map_err(Failed::Transfer)?;
         let mut p = new.zero_momenta();
         new.conjugate_momenta(&q, &v, &mut p);
-        state = State { t: state.t, q, p };
+        state = State { q, p, ..state };
         seen(true, &mut new, &state);
         advance(&mut new, &mut state, times[1], step, &method, |i, state| seen(true, i, state))?;
         Ok(state)
@@ -309,6 +311,7 @@ fn advance<S: Real, M: Stepper<Interpreter<S>>>(
         solver.advance(system, end).map_err(Failed::Step)?;
         solver.state(system, &mut state.q, &mut state.p);
         state.t = solver.time().to_f64();
+        state.steps += 1;
         seen(system, state);
     }
     Ok(())
