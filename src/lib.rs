@@ -64,6 +64,8 @@ pub use mbd_runtime as runtime;
 /// | `arithmetic = exact` | `exact`: the interpreter's operations, bit for bit; `fast`: rewritten for speed | `fast` |
 /// | `elimination = fewest` | how joints are eliminated: `fastest` by the cost model, with the `fewest` operations, or each joint by itself, `single` | `fastest` |
 /// | `rolled = never` | loops over like links: where they gain (`auto`), wherever links repeat (`always`), or `never` | `auto` |
+/// | `variant = "docked"` | a `[[variant]]` of the description in place of the model itself | |
+/// | `from = Arm` | types of the same description from which states are carried over ([`TransferFrom`](runtime::TransferFrom)); a list names variants: `[Arm, "held": Held]` | none |
 /// | `base = floating` | how the root of a URDF is attached to the ground: `fixed`, `floating` or `planar` | `fixed` |
 /// | `gravity = [0.0, 0.0, -1.62]` | in ground axes, m/s², instead of that of the file | the file's; of URDF `[0, 0, -9.81]` |
 /// | `efforts = false` | whether joint forces `tau` are inputs | `true` |
@@ -116,3 +118,8 @@ struct Constraints;
 #[cfg(doctest)]
 #[doc = include_str!("../docs/contacts.md")]
 struct Contacts;
+
+/// And that of the page on changing trees.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/variants.md")]
+struct Variants;

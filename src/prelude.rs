@@ -15,4 +15,6 @@ pub use crate::runtime::constrained::{close, Closing, Effort, Projection, Stabil
 pub use crate::runtime::integrate::{
     ImplicitMidpoint, Radau5, Rk4, Solver, Step, StepError, Stepper, Tolerances, Verner9,
 };
-pub use crate::runtime::{Accelerated, Conjugate, Constrained, Differentiable, Energetic, Interpreter, Scalar, System};
+pub use crate::runtime::{
+    Accelerated, Conjugate, Constrained, Differentiable, Energetic, Interpreter, Scalar, System, TransferFrom,
+};

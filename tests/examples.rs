@@ -6,6 +6,12 @@ mod arm_control;
 mod batch;
 #[path = "../examples/closed_loop.rs"]
 mod closed_loop;
+#[path = "../examples/clutch.rs"]
+mod clutch;
+#[path = "../examples/docking.rs"]
+mod docking;
+#[path = "../examples/gripper.rs"]
+mod gripper;
 #[path = "../examples/known_at_run_time.rs"]
 mod known_at_run_time;
 #[path = "../examples/lqr.rs"]
@@ -38,6 +44,21 @@ fn many_arms_fall_at_once() -> Outcome {
 #[test]
 fn a_linkage_stays_closed() -> Outcome {
     closed_loop::main()
+}
+
+#[test]
+fn a_clutch_locks() -> Outcome {
+    clutch::main()
+}
+
+#[test]
+fn a_ship_docks_and_leaves() -> Outcome {
+    docking::main()
+}
+
+#[test]
+fn an_arm_takes_a_box_and_throws_it() -> Outcome {
+    gripper::main()
 }
 
 #[test]

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use multibody::codegen::model::{ConstraintKind, Model, Value};
 use multibody::codegen::options::PlanOptions;
+use multibody::codegen::words;
 use multibody::runtime::tree::Source;
 
 use super::args::CheckArgs;
@@ -18,24 +19,42 @@ pub fn run(args: &CheckArgs, out: &mut dyn Write) -> Outcome {
     }
     let mut worst = Ok(());
     for path in &args.models {
-        match source::model(path, &args.import.import()) {
-            Ok(model) => match summary(path, &model, out) {
-                Err(Failure::Pipe) => return Err(Failure::Pipe),
-                Err(Failure::Message(what, help)) => {
-                    super::output::note(format_args!("{}: error: {what}\n  help: {help}", path.display()));
-                    worst = Err(Failure::Shown);
+        let checked = source::models(path, &args.import.import()).and_then(|(model, variants)| {
+            let all = std::iter::once((None, &model)).chain(variants.iter().map(|v| (Some(v.name.as_str()), &v.model)));
+            let mut worst = Ok(());
+            for (variant, model) in all {
+                match reported(path, variant, model, out) {
+                    Err(Failure::Pipe) => return Err(Failure::Pipe),
+                    Err(failure) => worst = Err(failure),
+                    Ok(()) => {}
                 }
-                Err(failure) => worst = Err(failure),
-                Ok(()) => {}
-            },
+            }
+            worst
+        });
+        match checked {
+            Err(Failure::Pipe) => return Err(Failure::Pipe),
             Err(Failure::Message(what, help)) => {
                 super::output::note(format_args!("error: {what}\n  help: {help}"));
                 worst = Err(Failure::Shown);
             }
             Err(failure) => worst = Err(failure),
+            Ok(()) => {}
         }
     }
     worst
+}
+
+/// The summary of a model or variant; what fails is told.
+fn reported(path: &Path, variant: Option<&str>, model: &Model, out: &mut dyn Write) -> Outcome {
+    let file = path.display();
+    let name = variant.map_or(file.to_string(), |variant| format!("{file}: variant {}", words::quote(variant)));
+    match summary(path, &name, model, out) {
+        Err(Failure::Message(what, help)) => {
+            super::output::note(format_args!("{name}: error: {what}\n  help: {help}"));
+            Err(Failure::Shown)
+        }
+        done => done,
+    }
 }
 
 /// The numbers of loops and of couplings as text.
@@ -45,7 +64,7 @@ fn counted_constraints(model: &Model) -> (Option<String>, Option<String>) {
     (count(loops, "loop"), count(model.constraints.len() - loops, "coupling"))
 }
 
-fn summary(path: &Path, model: &Model, out: &mut dyn Write) -> Outcome {
+fn summary(path: &Path, name: &str, model: &Model, out: &mut dyn Write) -> Outcome {
     let plan = source::planned(model, PlanOptions::default()).plan;
     source::tell_notices(path, &plan.notices);
     let params = plan.default_params();
@@ -72,8 +91,7 @@ fn summary(path: &Path, model: &Model, out: &mut dyn Write) -> Outcome {
     let kinds: Vec<String> = kinds.iter().map(|(kind, n)| format!("{n} {kind}")).collect();
     let prescribed = plan.slots.iter().filter(|s| matches!(s.at, Some(Source::Drive { .. })));
     let mut line = format!(
-        "{}: sound: {} bodies, {} joints ({}), nq {}, nv {}, mass {} kg",
-        path.display(),
+        "{name}: sound: {} bodies, {} joints ({}), nq {}, nv {}, mass {} kg",
         model.bodies.len(),
         model.joints.len(),
         kinds.join(", "),

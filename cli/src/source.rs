@@ -3,10 +3,11 @@
 use std::io::Read;
 use std::path::Path;
 
+use multibody::codegen::diag::Diagnostics;
 use multibody::codegen::model::{Model, Wrench, WrenchAxes};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
-use multibody::codegen::read::{load, ImportOptions};
+use multibody::codegen::read::{load_all, load_variant, ImportOptions, Variant};
 use multibody::codegen::search::{self, Chosen};
 use multibody::codegen::words;
 use multibody::runtime::interp::MassMatrixError;
@@ -53,19 +54,29 @@ fn similar(path: &Path) -> String {
 }
 
 /// Reads and checks a model. All findings go to standard error.
-pub fn model(path: &Path, options: &ImportOptions) -> Outcome<Model> {
+pub fn model(path: &Path, options: &ImportOptions, variant: Option<&str>) -> Outcome<Model> {
+    told(path, |file, text| load_variant(file, text, options, variant))
+}
+
+/// Reads and checks a model and its variants. All findings go to standard error.
+pub fn models(path: &Path, options: &ImportOptions) -> Outcome<(Model, Vec<Variant>)> {
+    told(path, |file, text| load_all(file, text, options))
+}
+
+/// What is read from a file, with the findings told.
+fn told<T>(path: &Path, read_text: impl FnOnce(&str, &str) -> (Option<T>, Diagnostics)) -> Outcome<T> {
     let text = read(path)?;
     let reading = format!("reading and checking {}", path.display());
-    let (model, findings) = mentioned(reading, || load(&path.to_string_lossy(), &text, options));
+    let (read, findings) = mentioned(reading, || read_text(&path.to_string_lossy(), &text));
     if !findings.0.is_empty() {
         note(format_args!("{findings}"));
     }
-    model.ok_or(Failure::Shown)
+    read.ok_or(Failure::Shown)
 }
 
 /// The model of a command's arguments, with the wrenches they ask for.
 pub fn model_of(args: &ModelArgs) -> Outcome<Model> {
-    let mut model = model(&args.model, &args.import.import())?;
+    let mut model = model(&args.model, &args.import.import(), args.variant.as_deref())?;
     for name in &args.wrenches {
         let names = model.bodies.iter().map(|b| b.name.as_str());
         let Some(body) = model.bodies.iter().position(|b| b.name == *name) else {

@@ -15,6 +15,8 @@ use crate::plan::Plan;
 use crate::search;
 use crate::symbolic::Counts;
 pub use crate::trace::{chosen_frames, sizes, trace};
+use crate::transfer::moves::moves;
+use crate::transfer::NoCode;
 
 /// Generated code and information about it.
 #[derive(Clone, Debug)]
@@ -58,4 +60,16 @@ pub fn generate_from(plan: &Plan, options: &Options) -> Result<Generated, Genera
         (set.modes.clone(), outputs.zip(set.outputs.iter().map(|p| p.program.counts())).collect())
     });
     Ok(Generated { source, counts: programs.counts(options), sets: sets.collect(), notices: plan.notices.clone() })
+}
+
+/// Rust that carries states over from one generated type to another: the implementation of the runtime's `TransferFrom`
+/// for the type of `to`, for which `options` are, from the type `old` of the model `from` in the same module. The new type
+/// needs the outputs `rates` and `momenta`, the old one `rates` and, where a floating joint is new, `frames` of all bodies.
+///
+/// # Errors
+/// [`NoCode`]: the new joints are other than floating, or more than the tree has changed.
+pub fn transfer_code(from: &Model, old: &str, to: &Model, options: &Options) -> Result<String, NoCode> {
+    let [from, to] = [from, to].map(|model| Plan::new(model, options.plan.snap));
+    let moves = moves(&from, &to)?;
+    Ok(emit::transfer::implementation(&from, old, &to, options, &moves))
 }

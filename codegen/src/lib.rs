@@ -35,4 +35,6 @@ pub mod wasm;
 #[doc(hidden)]
 pub use import::words;
 
-pub use generate::{generate, Arithmetic, GenerateError, Generated, Options, Output, Precision, RolledCode};
+pub use generate::{
+    generate, transfer_code, Arithmetic, GenerateError, Generated, Options, Output, Precision, RolledCode,
+};

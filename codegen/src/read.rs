@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use crate::check::check;
+use crate::check::{changed, check};
 use crate::diag::Diagnostics;
 use crate::import::source::{Findings, Span};
-use crate::import::words::quote;
+use crate::import::words::{did_you_mean, list, quote};
 use crate::import::{toml, urdf};
 use crate::model::Model;
+use crate::names::rust_name;
 
 pub use crate::import::{Base, ImportOptions};
 
@@ -17,8 +18,20 @@ pub use crate::import::{Base, ImportOptions};
 pub struct Reading {
     /// The model.
     pub model: Model,
+    /// Its variants, in the order of the text.
+    pub variants: Vec<Variant>,
     /// Warnings and notices about its description.
     pub findings: Diagnostics,
+}
+
+/// A model after changes of its tree, as its description says (`[[variant]]`).
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Variant {
+    /// Name.
+    pub name: String,
+    /// The model. It is called after the model that it is a variant of, and the variant.
+    pub model: Model,
 }
 
 /// Reads and checks a description in the format its file name ends in: `.toml`, `.urdf`, or `.xml` with a `<robot>` in
@@ -30,8 +43,8 @@ pub struct Reading {
 /// # Errors
 /// All findings at once, in the order of the text, where one of them is an error.
 pub fn model(file: &str, text: &str, options: &ImportOptions) -> Result<Reading, Diagnostics> {
-    match load(file, text, options) {
-        (Some(model), findings) => Ok(Reading { model, findings }),
+    match load_all(file, text, options) {
+        (Some((model, variants)), findings) => Ok(Reading { model, variants, findings }),
         (None, findings) => Err(findings),
     }
 }
@@ -43,24 +56,93 @@ impl Model {
     /// # Errors
     /// All findings at once where one of them is an error; a file that cannot be read is one.
     pub fn load(path: impl AsRef<Path>) -> Result<Model, Diagnostics> {
-        let name = path.as_ref().display().to_string();
-        match std::fs::read_to_string(&path) {
-            Ok(text) => model(&name, &text, &ImportOptions::default()).map(|reading| reading.model),
-            Err(error) => {
-                let mut findings = Findings::new(&name, "");
-                findings.error(
-                    Span::FILE,
-                    format!("cannot read the file: {error}"),
-                    "check its name and its access rights",
-                );
-                Err(findings.finish())
-            }
+        read_file(path.as_ref()).map(|reading| reading.model)
+    }
+
+    /// [`Model::load`], but the variant `name` of the model.
+    ///
+    /// # Errors
+    /// Those of [`Model::load`]; a variant that there is not is one.
+    pub fn load_variant(path: impl AsRef<Path>, name: &str) -> Result<Model, Diagnostics> {
+        let reading = read_file(path.as_ref())?;
+        reading.into_variant(name).map_err(|(message, help)| {
+            let mut findings = Findings::new(&path.as_ref().display().to_string(), "");
+            findings.error(Span::FILE, message, help);
+            findings.finish()
+        })
+    }
+}
+
+impl Reading {
+    /// The variant called so.
+    ///
+    /// # Errors
+    /// There is none: a message, and what to do.
+    pub fn into_variant(self, name: &str) -> Result<Model, (String, String)> {
+        chosen(self.model, self.variants, Some(name))
+    }
+}
+
+/// A model or, where a name is given, its variant of that name.
+///
+/// # Errors
+/// There is none: a message, and what to do.
+pub fn chosen(model: Model, variants: Vec<Variant>, name: Option<&str>) -> Result<Model, (String, String)> {
+    let Some(name) = name else { return Ok(model) };
+    let names: Vec<String> = variants.iter().map(|variant| variant.name.clone()).collect();
+    let found = variants.into_iter().find(|variant| variant.name == name);
+    found.map(|variant| variant.model).ok_or_else(|| {
+        let names = || names.iter().map(String::as_str);
+        let help = did_you_mean(name, names(), || match names().count() {
+            0 => "describe it in the file as a `[[variant]]`".into(),
+            _ => format!("the variants are {}", list(names())),
+        });
+        (format!("the model has no variant {}", quote(name)), help)
+    })
+}
+
+fn read_file(path: &Path) -> Result<Reading, Diagnostics> {
+    let name = path.display().to_string();
+    match std::fs::read_to_string(path) {
+        Ok(text) => model(&name, &text, &ImportOptions::default()),
+        Err(error) => {
+            let mut findings = Findings::new(&name, "");
+            let help = "check its name and its access rights";
+            findings.error(Span::FILE, format!("cannot read the file: {error}"), help);
+            Err(findings.finish())
         }
     }
 }
 
-/// The same for tools that show findings either way: a model exactly where no finding is an error, and all findings.
+/// The same for tools that show findings either way: a model exactly where no finding is an error, and all findings,
+/// those about its variants too.
 pub fn load(file: &str, text: &str, options: &ImportOptions) -> (Option<Model>, Diagnostics) {
+    let (model, findings) = load_all(file, text, options);
+    (model.map(|(model, _)| model), findings)
+}
+
+/// [`load`], of the variant of that name if there is one; that there is no such variant is an error.
+pub fn load_variant(
+    file: &str,
+    text: &str,
+    options: &ImportOptions,
+    variant: Option<&str>,
+) -> (Option<Model>, Diagnostics) {
+    let (read, mut findings) = load_all(file, text, options);
+    let Some((model, variants)) = read else { return (None, findings) };
+    match chosen(model, variants, variant) {
+        Ok(model) => (Some(model), findings),
+        Err((message, help)) => {
+            let mut error = Findings::new(file, text);
+            error.error(Span::FILE, message, help);
+            findings.0.splice(0..0, error.finish().0);
+            (None, findings)
+        }
+    }
+}
+
+/// [`load`], with all variants.
+pub fn load_all(file: &str, text: &str, options: &ImportOptions) -> (Option<(Model, Vec<Variant>)>, Diagnostics) {
     let mut findings = Findings::new(file, text);
     let extension = Path::new(file).extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let mut refuse = |message: &str, help: &str| {
@@ -77,8 +159,23 @@ pub fn load(file: &str, text: &str, options: &ImportOptions) -> (Option<Model>, 
         Some(other) => refuse(&format!("cannot read files that end in {}", quote(other)), KNOWN),
         None => refuse("the file name does not tell the format", KNOWN),
     };
-    let model = raw.and_then(|raw| check(&raw, &mut findings));
-    (model.filter(|_| !findings.has_errors()), findings.finish())
+    let mut variants = Vec::new();
+    let model = raw.and_then(|raw| {
+        let model = check(&raw, &mut findings);
+        let base = findings.clone();
+        for variant in &raw.variants {
+            let mut of_variant = base.fresh();
+            let raw = changed(&raw, variant, &mut of_variant);
+            let model_of_variant = check(&raw, &mut of_variant);
+            findings.take_variant(&quote(&variant.name.value), &base, of_variant);
+            if let (Some(model), Some(mut changed)) = (&model, model_of_variant) {
+                changed.name = rust_name(&format!("{}_{}", model.name, variant.name.value));
+                variants.push(Variant { name: variant.name.value.clone(), model: changed });
+            }
+        }
+        model
+    });
+    (model.filter(|_| !findings.has_errors()).map(|model| (model, variants)), findings.finish())
 }
 
 #[cfg(test)]

@@ -31,6 +31,17 @@ pub struct Name {
     pub ident: Ident,
 }
 
+/// A type of the same description.
+#[derive(Clone, Debug)]
+pub struct From {
+    /// Its variant; `None`: the model itself.
+    pub variant: Option<String>,
+    /// The type.
+    pub ident: Ident,
+    /// The whole entry.
+    pub place: Place,
+}
+
 /// All arguments that could be parsed.
 #[derive(Clone, Debug, Default)]
 pub struct Args {
@@ -38,6 +49,10 @@ pub struct Args {
     pub source: Option<(Source, Place)>,
     /// The type.
     pub name: Option<Name>,
+    /// The variant of the description.
+    pub variant: Option<(String, Place)>,
+    /// Types from which states are carried over, with the variants that they were made from.
+    pub from: Vec<From>,
     /// How the root is attached.
     pub base: Option<(Base, Place)>,
     /// Gravity instead of the model's.
@@ -65,9 +80,11 @@ pub enum Modes {
     Listed(String),
 }
 
-const KEYS: [&str; 16] = [
+const KEYS: [&str; 18] = [
     "path",
     "name",
+    "variant",
+    "from",
     "outputs",
     "scalar",
     "arithmetic",
@@ -164,6 +181,7 @@ impl Args {
             "toml" => self.set_source(key, Source::Toml(text(&word, value)?), value)?,
             "urdf" => self.set_source(key, Source::Urdf(text(&word, value)?), value)?,
             "name" => self.name = Some(name(value)?),
+            "variant" => self.variant = Some((text(&word, value)?, place(value))),
             "outputs" => self.options.outputs = outputs(value)?,
             "scalar" => {
                 self.options.precision = choice("scalar", value, &Precision::ALL.map(|p| (p.name(), p)))?;
@@ -171,6 +189,7 @@ impl Args {
             "arithmetic" => {
                 self.options.arithmetic = choice("arithmetic", value, &Arithmetic::ALL.map(|a| (a.name(), a)))?;
             }
+            "from" => self.from = from(value)?,
             // The second words are those of before 0.1.
             "elimination" | "forms" => {
                 let choices = EliminationStrategy::ALL.map(|e| (e.name(), e));
@@ -226,6 +245,7 @@ fn text(key: &str, value: &[TokenTree]) -> Result<String, Message> {
             "path" => {
                 "write the path itself, relative to the folder of Cargo.toml: `path = \"models/arm.toml\"`".to_string()
             }
+            "variant" => "write the name of a `[[variant]]` of the description: `variant = \"docked\"`".to_string(),
             _ => format!("write the description itself, `{key} = r#\"...\"#`, or name its file with `path`"),
         };
         Message::new(place(value), format!("`{key}` has to be a string literal"), help)
@@ -259,6 +279,28 @@ fn name(value: &[TokenTree]) -> Result<Name, Message> {
             "write a name, with attributes and visibility where wanted: `name = Arm` or `name = pub(crate) Arm`",
         )),
     }
+}
+
+/// `Type`, or a list of types, each of a variant: `[Type, "variant": Type]`.
+fn from(value: &[TokenTree]) -> Result<Vec<From>, Message> {
+    let list = match value {
+        [TokenTree::Ident(_)] => vec![value.to_vec()],
+        _ => elements("from", value, "[Whole, \"held\": Held]")?,
+    };
+    let one = |entry: Vec<TokenTree>| {
+        let place = place(&entry);
+        let help = "write the type, and before it the variant that it was made from: `from = [Whole, \"held\": Held]`";
+        let refuse = || Message::new(place, "`from` has to name types of this description", help);
+        match entry.as_slice() {
+            [TokenTree::Ident(ident)] => Ok(From { variant: None, ident: ident.clone(), place }),
+            [TokenTree::Literal(variant), colon, TokenTree::Ident(ident)] if is_punct(Some(colon), ':') => {
+                let variant = literal::string(&variant.to_string()).ok_or_else(refuse)?;
+                Ok(From { variant: Some(variant), ident: ident.clone(), place })
+            }
+            _ => Err(refuse()),
+        }
+    };
+    list.into_iter().map(one).collect()
 }
 
 fn choice<T: Copy>(key: &str, value: &[TokenTree], choices: &[(&'static str, T)]) -> Result<T, Message> {

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use mbd_codegen::diag::{Diagnostic, Severity};
 use mbd_codegen::model::Model;
 use mbd_codegen::modes::{parse, ModeChoice};
-use mbd_codegen::read::{load, Base, ImportOptions};
+use mbd_codegen::read::{chosen, load_all, Base, ImportOptions, Variant};
 use mbd_codegen::words::{closest, did_you_mean, list, quote};
-use mbd_codegen::{generate, Output};
+use mbd_codegen::{generate, transfer_code, Output};
 use proc_macro2::{Group as Tokens, Ident, Literal, Span, TokenStream, TokenTree};
 
-use crate::args::{self, Args, Modes, Name, Source};
+use crate::args::{self, Args, From, Modes, Name, Source};
 use crate::message::{Message, Place};
 use crate::stub;
 
@@ -24,10 +24,15 @@ pub fn expand(input: TokenStream) -> TokenStream {
     let mut args = args::parse(input, &mut errors);
     let text = args.source.clone().and_then(|(source, place)| read(&source, place, &mut errors));
     let mut watched = TokenStream::new();
-    let mut model = None;
+    let (mut model, mut all) = (None, None);
     if let Some(text) = &text {
         let (read, findings) = text.load(&args);
-        model = read;
+        all = read.clone();
+        model = read.and_then(|(model, variants)| {
+            let (name, place) = args.variant.as_ref().map_or((None, text.place), |(name, place)| (Some(name), *place));
+            let chosen = chosen(model, variants, name.map(String::as_str));
+            chosen.map_err(|(message, help)| errors.push(Message::new(place, message, help))).ok()
+        });
         judge(text, &findings, model.as_ref(), &mut args, &mut errors);
         if let (Some((modes, place)), Some(model)) = (args.modes.clone(), model.as_ref()) {
             let (choice, file) = modes_of(&modes, place, model, &mut errors);
@@ -43,7 +48,11 @@ pub fn expand(input: TokenStream) -> TokenStream {
     args.options.type_name = name.ident.to_string();
     args.options.runtime = RUNTIME.to_string();
     let generated = model.and_then(|m| match generate(&m, &args.options) {
-        Ok(generated) => Some(generated.source),
+        Ok(generated) => {
+            let (carried, errors) = carried(&m, &args, all.as_ref());
+            out.extend(errors.iter().map(Message::compile_error));
+            Some(generated.source + &carried)
+        }
         Err(error) => {
             let place = text.as_ref().map_or(Span::call_site().into(), |t| t.place);
             out.extend(Message::new(place, error.to_string(), "").compile_error());
@@ -60,6 +69,23 @@ pub fn expand(input: TokenStream) -> TokenStream {
         }
     }
     out
+}
+
+/// Code that carries states over from other types of the same description, and what is wrong with them.
+fn carried(model: &Model, args: &Args, all: Option<&(Model, Vec<Variant>)>) -> (String, Vec<Message>) {
+    let (mut code, mut errors) = (String::new(), Vec::new());
+    for From { variant, ident, place } in &args.from {
+        let Some((base, variants)) = all.cloned() else { continue };
+        let made = chosen(base, variants, variant.as_deref()).and_then(|from| {
+            let help = "leave the type out of `from`, or change the variant".to_string();
+            transfer_code(&from, &ident.to_string(), model, &args.options).map_err(|e| (e.to_string(), help))
+        });
+        match made {
+            Ok(text) => code += &text,
+            Err((message, help)) => errors.push(Message::new(*place, message, help)),
+        }
+    }
+    (code, errors)
 }
 
 /// A description and its source.
@@ -131,11 +157,11 @@ impl Text {
         (format!("{at}{}", d.message), d.help.clone())
     }
 
-    fn load(&self, args: &Args) -> (Option<Model>, Vec<Diagnostic>) {
+    fn load(&self, args: &Args) -> (Option<(Model, Vec<Variant>)>, Vec<Diagnostic>) {
         let base = args.base.map_or(Base::default(), |(base, _)| base);
         // This is reported at the argument itself.
         let base = if self.is_toml() { Base::default() } else { base };
-        let (model, findings) = load(&self.label, &self.text, &ImportOptions { base, gravity: args.gravity });
+        let (model, findings) = load_all(&self.label, &self.text, &ImportOptions { base, gravity: args.gravity });
         (model, findings.0)
     }
 

@@ -34,6 +34,7 @@ pub mod spatial;
 #[cfg(feature = "alloc")]
 pub mod sweep;
 pub mod system;
+pub mod transfer;
 #[cfg(feature = "alloc")]
 pub mod tree;
 pub mod trig;
@@ -50,3 +51,4 @@ pub use error::{ConstraintError, Named, StepError};
 pub use interp::{Interpreter, MassMatrixError};
 pub use scalar::Scalar;
 pub use system::{Accelerated, Conjugate, Constrained, Differentiable, Energetic, Real, StateDerivatives, System};
+pub use transfer::TransferFrom;

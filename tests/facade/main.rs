@@ -9,3 +9,4 @@ mod macro_errors;
 pub mod macro_model;
 mod mechanisms;
 mod reference;
+mod variants;

@@ -90,6 +90,9 @@ pub struct ModelArgs {
     pub model: PathBuf,
     #[command(flatten)]
     pub import: ImportArgs,
+    /// Variant of the model, a `[[variant]]` of its description
+    #[arg(long, value_name = "NAME")]
+    pub variant: Option<String>,
     /// Bodies on which external wrenches act, in body axes, in addition to those of the model; separated by commas
     #[arg(long = "wrench", value_name = "LIST", value_delimiter = ',')]
     pub wrenches: Vec<String>,

@@ -39,6 +39,21 @@ fn check_tells_what_is_sound() {
 }
 
 #[test]
+fn variants_are_checked_and_chosen() {
+    let model = "models/variants/chain.toml";
+    let output = good(run(&["check", model]));
+    let lines: Vec<&str> = out(&output).lines().collect();
+    assert_eq!(lines.len(), 4, "{lines:?}");
+    assert!(lines[1].starts_with("models/variants/chain.toml: variant `broken`: sound: 4 bodies"), "{}", lines[1]);
+    assert!(lines[2].contains("variant `held`") && lines[2].contains("nq 2, nv 2"), "{}", lines[2]);
+    let code = good(run(&["generate", model, "--variant", "broken", "--outputs", "momenta"]));
+    assert!(out(&code).contains("pub struct ChainBroken"), "{}", out(&code));
+    good(run(&["count", model, "--variant", "held"]));
+    bad(run(&["count", model, "--variant", "brocken"]), &["no variant `brocken`", "did you mean `broken`?"]);
+    bad(run(&["count", "models/ur5.urdf", "--variant", "held"]), &["no variant `held`", "`[[variant]]`"]);
+}
+
+#[test]
 fn check_tells_all_findings() {
     let file = "codegen/tests/broken/toml/tree_unknown_names.toml";
     let expected = std::fs::read_to_string(format!("{ROOT}/codegen/tests/broken/toml/tree_unknown_names.txt"));

@@ -14,12 +14,15 @@ mod starts;
 mod stops;
 mod symmetric;
 mod tree;
+mod variants;
 
 use self::names::Names;
 use self::numbers::{Numbers, Quantity};
+pub(crate) use self::variants::changed;
 use crate::import::raw::{RawConstraint, RawGravity, RawModel, RawNumber, RawValue};
 use crate::import::source::{Findings, Span};
 use crate::import::words::quote;
+
 use crate::model::{Constraint, ConstraintKind, Frame, Gravity, Joint, JointMotion, Model, Param, Value, Wrench};
 
 /// Checks `raw`; a model only where no error was found, neither here nor before. The model takes its name from the file

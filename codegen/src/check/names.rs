@@ -69,6 +69,7 @@ impl<'r> Names<'r> {
         unique(raw.wrenches.iter().map(|w| ("wrench", w.name.as_ref().unwrap_or(&w.body))), findings);
         let contacts = raw.contacts.iter().map(|c| ("contact", &c.name));
         unique(raw.constraints.iter().map(|c| (c.kind(), c.name())).chain(contacts), findings);
+        unique(raw.variants.iter().map(|v| ("variant", &v.name)), findings);
         unique(raw.shapes.iter().map(|s| ("shape", &s.name)), findings);
         let mut names = Names { raw, bodies: HashMap::new(), joints: HashMap::new(), frames: HashMap::new() };
         for (k, b) in raw.bodies.iter().enumerate() {

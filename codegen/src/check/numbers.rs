@@ -171,7 +171,7 @@ impl<'r, 'f, 't> Numbers<'r, 'f, 't> {
             let name = &p.name.value;
             let message = format!("parameter {} is not used", quote(name));
             let help = format!("remove it, or use it: {}", quote(&format!("mass = {{ param = \"{name}\" }}")));
-            self.findings.warning(p.name.span, message, help);
+            self.findings.unused(p.name.span, message, help);
         }
     }
 }

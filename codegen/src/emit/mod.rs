@@ -12,6 +12,7 @@ mod rolled;
 mod signature;
 mod straight;
 mod traits;
+pub(crate) mod transfer;
 
 use std::fmt::Write;
 

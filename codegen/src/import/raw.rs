@@ -341,6 +341,21 @@ pub enum RawGravity {
     Input,
 }
 
+/// A model as changes of another one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawVariant {
+    /// Name.
+    pub name: Spanned<String>,
+    /// Bodies that are left out.
+    pub remove: Vec<Spanned<String>>,
+    /// Joints whose bodies float afterwards; loops, couplings and contacts that are left out.
+    pub cut: Vec<Spanned<String>>,
+    /// Joints that are held where they stand.
+    pub lock: Vec<Spanned<String>>,
+    /// What is added. A joint replaces the one that carries its child.
+    pub added: RawModel,
+}
+
 /// A model as read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawModel {
@@ -368,6 +383,8 @@ pub struct RawModel {
     pub surface: RawSurface,
     /// Where contacts between all pairs of shapes are asked for.
     pub all_pairs: Option<Span>,
+    /// Descriptions of the same mechanism after changes of its tree, in file order.
+    pub variants: Vec<RawVariant>,
     /// Whether a body or joint was left out after a finding. Unknown names and bodies without a joint are then not
     /// reported again.
     pub incomplete: bool,
@@ -392,6 +409,7 @@ impl RawModel {
             contacts: Vec::new(),
             surface: RawSurface::default(),
             all_pairs: None,
+            variants: Vec::new(),
             incomplete: false,
             lenient: false,
         }

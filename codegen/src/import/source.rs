@@ -85,12 +85,29 @@ pub struct Findings<'a> {
     file: Arc<str>,
     map: SourceMap<'a>,
     list: Vec<Diagnostic>,
+    /// Warnings about what nothing uses, unless a variant does.
+    unused: Vec<Diagnostic>,
 }
 
 impl<'a> Findings<'a> {
     /// A collector without findings; `file` is the name that the caller gave.
     pub fn new(file: &str, text: &'a str) -> Self {
-        Findings { file: file.into(), map: SourceMap::new(text), list: Vec::new() }
+        Findings { file: file.into(), map: SourceMap::new(text), list: Vec::new(), unused: Vec::new() }
+    }
+
+    /// A collector without findings about the same file.
+    pub fn fresh(&self) -> Self {
+        Findings { list: Vec::new(), unused: Vec::new(), ..self.clone() }
+    }
+
+    /// Takes over the findings about the variant `name` of the model that those of `base` are about: what is new. What
+    /// the variant uses is not unused.
+    pub fn take_variant(&mut self, name: &str, base: &Findings, variant: Findings) {
+        let new = variant.list.into_iter().filter(|finding| !base.list.contains(finding));
+        let named =
+            new.map(|finding| Diagnostic { message: format!("in variant {name}: {}", finding.message), ..finding });
+        self.list.extend(named);
+        self.unused.retain(|finding| variant.unused.contains(finding));
     }
 
     /// Adds a finding.
@@ -100,15 +117,7 @@ impl<'a> Findings<'a> {
 
     /// Adds a finding at a place.
     fn add_at(&mut self, severity: Severity, at: Origin, message: impl Into<String>, help: impl Into<String>) {
-        let Origin { file, line, column } = at;
-        self.list.push(Diagnostic {
-            severity,
-            file: file.to_string(),
-            line,
-            column,
-            message: one_line(message.into()),
-            help: one_line(help.into()),
-        });
+        self.list.push(diagnostic(severity, at, message.into(), help.into()));
     }
 
     /// Adds an error: the file cannot be used.
@@ -124,6 +133,11 @@ impl<'a> Findings<'a> {
     /// Adds a warning: something is ignored or suspicious.
     pub fn warning(&mut self, span: Span, message: impl Into<String>, help: impl Into<String>) {
         self.add(Severity::Warning, span, message, help);
+    }
+
+    /// Adds a warning about something that nothing uses.
+    pub fn unused(&mut self, span: Span, message: impl Into<String>, help: impl Into<String>) {
+        self.unused.push(diagnostic(Severity::Warning, self.origin(span), message.into(), help.into()));
     }
 
     /// Adds a notice: the reader changed something.
@@ -149,9 +163,15 @@ impl<'a> Findings<'a> {
 
     /// All findings, in the order of the file.
     pub fn finish(mut self) -> Diagnostics {
+        self.list.append(&mut self.unused);
         self.list.sort_by_key(|d| (d.line, d.column));
         Diagnostics(self.list)
     }
+}
+
+fn diagnostic(severity: Severity, at: Origin, message: String, help: String) -> Diagnostic {
+    let Origin { file, line, column } = at;
+    Diagnostic { severity, file: file.to_string(), line, column, message: one_line(message), help: one_line(help) }
 }
 
 /// Escapes control characters, so that a finding is always one line.

@@ -3,10 +3,11 @@
 use std::f64::consts::TAU;
 
 use mbd_runtime::spatial::Mat3;
+use mbd_runtime::transfer::quaternion;
 use mbd_runtime::tree::Kind;
 
 use crate::plan::Rigid;
-use crate::rounded_once::{atan2, norm};
+use crate::rounded_once::atan2;
 
 /// One elementary joint: its kind, and the pose of its node in the node before it at zero coordinates.
 #[derive(Clone, Debug)]
@@ -80,24 +81,4 @@ fn heading(y: f64, x: f64) -> f64 {
 /// The angle of the rotation about z that is nearest to `r`.
 fn turn(r: &Mat3<f64>) -> f64 {
     heading(r[1][0] - r[0][1], r[0][0] + r[1][1])
-}
-
-/// Unit quaternion `(x, y, z, w)` of a rotation matrix, from its largest component: no cancellation.
-pub(super) fn quaternion(r: &Mat3<f64>) -> [f64; 4] {
-    let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = *r;
-    // Each row is four times one component times all of them.
-    let rows = [
-        [1.0 + xx - yy - zz, xy + yx, xz + zx, zy - yz],
-        [xy + yx, 1.0 - xx + yy - zz, yz + zy, xz - zx],
-        [xz + zx, yz + zy, 1.0 - xx - yy + zz, yx - xy],
-        [zy - yz, xz - zx, yx - xy, 1.0 + xx + yy + zz],
-    ];
-    let mut best = 3;
-    for k in 0..3 {
-        if rows[k][k] > rows[best][best] {
-            best = k;
-        }
-    }
-    let size = norm(rows[best]);
-    rows[best].map(|x| x / size)
 }

@@ -11,6 +11,7 @@
 
 mod error;
 mod extract;
+pub(crate) mod moves;
 mod rejoin;
 
 use std::collections::HashMap;
@@ -22,6 +23,7 @@ use mbd_runtime::tree::{Dims, Source, Tree, TreeFrame, TreeWrench, WrenchAxes};
 use mbd_runtime::{Constrained, Interpreter, System};
 
 pub use error::{RejoinError, TransferError};
+pub use moves::NoCode;
 
 use crate::model::{JointMotion, Unit};
 use crate::plan::{Plan, Rigid, Slot};

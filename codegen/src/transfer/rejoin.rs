@@ -1,9 +1,9 @@
 //! Models of the same bodies with one joint exchanged: what a transfer leads to.
 
 use mbd_runtime::spatial::Vec3;
+use mbd_runtime::transfer::quaternion;
 
 use super::error::RejoinError;
-use super::extract::quaternion;
 use crate::model::{ConstraintKind, Joint, JointKind, JointMotion, Model, Placement, Rotation, Value};
 use crate::plan::Rigid;
 use crate::rounded_once::{atan2, norm};

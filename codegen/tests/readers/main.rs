@@ -7,4 +7,5 @@ mod mutation;
 mod toml_constraints;
 mod toml_contacts;
 mod toml_reader;
+mod toml_variants;
 mod urdf_second_opinion;

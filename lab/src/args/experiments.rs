@@ -21,6 +21,8 @@ pub struct ExperimentsArgs {
 pub enum Experiment {
     /// Momenta against accelerations on a closed loop: tables 7.1 to 7.4, figures 7.9 to 7.15
     Biped(BipedArgs),
+    /// A chain of 100 links of which a joint breaks: table 7.5, figure 7.16, conservation, accuracy
+    Breaking(BreakingArgs),
     /// Time of an evaluation over the number of links of open, branched and closed chains: figures 7.4 to 7.6
     Scaling(ScalingArgs),
 }
@@ -37,6 +39,20 @@ pub struct BipedArgs {
     /// Steps of 1 ms of the run with projection; a million takes minutes
     #[arg(long, value_name = "N", default_value_t = 10_000)]
     pub steps: u64,
+}
+
+/// `mbd-lab experiments breaking`.
+#[derive(Args)]
+pub struct BreakingArgs {
+    /// Directory for the figures; without it there are only tables
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Short rounds of the measurements of time
+    #[arg(long)]
+    pub quick: bool,
+    /// Time to which the motion is compared with double-double numbers, s; 10 s take minutes, 0 leaves it out
+    #[arg(long, value_name = "S", default_value_t = 10.0)]
+    pub end: f64,
 }
 
 /// `mbd-lab experiments scaling`.

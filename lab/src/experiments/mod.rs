@@ -2,6 +2,7 @@
 //! states the decisions on points that the thesis leaves open.
 
 mod biped;
+mod breaking;
 mod clock;
 mod forms;
 mod mechanism;
@@ -23,6 +24,7 @@ use mbd_cli::{Failure, Outcome};
 pub fn run(args: &ExperimentsArgs, out: &mut dyn Write) -> Outcome {
     match &args.experiment {
         Experiment::Biped(args) => biped::run(args, out),
+        Experiment::Breaking(args) => breaking::run(args, out),
         Experiment::Scaling(args) => scaling::run(args, out),
     }
 }

@@ -1,7 +1,7 @@
 //! Model files of thesis 7.2 for any number of links, and of mechanisms with many loops: open and closed chains, trees,
 //! four-bars. The files contain the initial coordinates.
 
-use super::text::{forking, thesis_link_about, Link, Text, FRICTION, GRAVITY, LENGTH};
+use super::text::{forking, thesis_link, Link, Text, FRICTION, GRAVITY, LENGTH};
 
 const Y: [f64; 3] = [0.0, 1.0, 0.0];
 const Z: [f64; 3] = [0.0, 0.0, 1.0];
@@ -17,6 +17,24 @@ pub fn open(n: usize) -> String {
 pub fn tree(n: usize) -> String {
     let comment = format!("Planar tree of {n} links (thesis 7.2) that forks three times.");
     forking(&format!("tree{n}"), &comment, 4, FRICTION, |k| n / BRANCHES + usize::from(k < n % BRANCHES))
+}
+
+/// Initial angle of joint `i` of the chain that breaks (thesis 7.4), from 1, is this times `i`, rad.
+const BREAKING_START: f64 = 0.0005;
+
+/// Open planar chain of `n` links as in [`open`], bent (thesis 7.4), with a friction of `damping` N m s/rad in every
+/// joint and a moment of inertia of `across` kg m² of a link about its centre of mass.
+pub fn breaking(n: usize, damping: f64, across: f64) -> String {
+    let comment = format!("Chain of {n} equal links (thesis 7.4), of which a joint breaks while it falls.");
+    let mut text = Text::new(&format!("breaking{n}"), &comment, GRAVITY);
+    let mut parent: Option<String> = None;
+    for k in 1..=n {
+        let name = format!("link{k}");
+        text.link(&Link { damping, inertia: [0.0, across, across], ..thesis_link(&name, parent.as_deref()) });
+        text.start(BREAKING_START * k as f64, false);
+        parent = Some(name);
+    }
+    text.finish()
 }
 
 /// Angle of link `i` of a closed chain of `n` at the start, counted from x, rad; `i` begins at 1.
@@ -46,7 +64,7 @@ fn chain(name: &str, comment: &str, n: usize, axis: impl Fn(usize) -> [f64; 3], 
     let mut before = 0.0;
     for i in 1..=n {
         let link = format!("link{i}");
-        thesis_link_about(&mut text, &link, parent.as_deref(), axis(i), FRICTION);
+        text.link(&Link { axis: axis(i), ..thesis_link(&link, parent.as_deref()) });
         if closed.is_some() {
             let angle = match axis(i) == Z {
                 true => arc(i, n) - std::mem::replace(&mut before, arc(i, n)),

@@ -3,6 +3,7 @@
 //!
 //! `list.rs` is the list of scenes; a new scene is a new entry there.
 
+pub mod breaking;
 mod dynamics;
 pub mod experiments;
 mod list;

@@ -75,31 +75,28 @@ impl Text {
     }
 }
 
-/// A link of thesis 7.2, kg and m: uniform and slender, with `m l²/3` about its joint.
-const MASS: f64 = 0.01;
-pub(super) const LENGTH: f64 = 0.05;
+/// Mass of a link of thesis 7.2, kg: uniform and slender, with `m l²/3` about its joint.
+pub(super) const MASS: f64 = 0.01;
+/// Length of a link, m.
+pub const LENGTH: f64 = 0.05;
 /// Viscous friction of every joint in thesis 7.2, N m s/rad.
 pub(super) const FRICTION: f64 = 0.001;
 /// Gravity in the plane x-y, m/s².
 pub(super) const GRAVITY: [f64; 3] = [0.0, -9.81, 0.0];
 
-fn thesis_link(text: &mut Text, name: &str, parent: Option<&str>, damping: f64) {
-    thesis_link_about(text, name, parent, [0.0, 0.0, 1.0], damping);
-}
-
-/// The same link on a revolute joint about any axis.
-pub(super) fn thesis_link_about(text: &mut Text, name: &str, parent: Option<&str>, axis: [f64; 3], damping: f64) {
+/// A link of the thesis behind another one, on a revolute joint about z.
+pub(super) fn thesis_link<'a>(name: &'a str, parent: Option<&'a str>) -> Link<'a> {
     let across = MASS * LENGTH * LENGTH / 12.0;
-    text.link(&Link {
+    Link {
         name,
         parent,
         mass: MASS,
         com: [LENGTH / 2.0, 0.0, 0.0],
         inertia: [0.0, across, across],
         place: [if parent.is_some() { LENGTH } else { 0.0 }, 0.0, 0.0],
-        axis,
-        damping,
-    });
+        axis: [0.0, 0.0, 1.0],
+        damping: FRICTION,
+    }
 }
 
 /// Open planar chain of thesis 7.2, straight along x at zero angles, with joints about z.
@@ -109,7 +106,7 @@ pub(super) fn chain(name: &str, n: usize, damping: f64) -> String {
     let mut parent: Option<String> = None;
     for k in 1..=n {
         let link = format!("link{k}");
-        thesis_link(&mut text, &link, parent.as_deref(), damping);
+        text.link(&Link { damping, ..thesis_link(&link, parent.as_deref()) });
         parent = Some(link);
     }
     text.finish()
@@ -140,7 +137,7 @@ pub(super) fn forking(name: &str, comment: &str, levels: u32, damping: f64, link
                     _ => "right",
                 };
                 let link = format!("link{number}{side}");
-                thesis_link(&mut text, &link, parent.as_deref(), damping);
+                text.link(&Link { damping, ..thesis_link(&link, parent.as_deref()) });
                 parent = Some(link);
             }
             count += 1;

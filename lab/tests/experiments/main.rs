@@ -1,6 +1,7 @@
 //! The biped of the thesis in every formulation, and the command that repeats the experiments of the thesis.
 
 mod biped;
+mod breaking;
 #[allow(dead_code)]
 #[path = "../../../cli/tests/command/documented.rs"]
 mod documented;

@@ -15,14 +15,15 @@ const COUPLING: &[&str] = &["name", "joints", "ratios", "offset", "decay"];
 /// The entry of a coupling.
 const COUPLINGS: [&str; 4] = ["coupling", "gear", "gears", "rack"];
 
-/// All loops and couplings, in the order of the file.
-pub(super) fn all(top: &Table, raw: &mut RawModel, findings: &mut Findings) {
+/// All loops and couplings, in the order of the file, between joints of the model and `joints`.
+pub(super) fn all(top: &Table, joints: &[RawJoint], raw: &mut RawModel, findings: &mut Findings) {
     let mut found = Vec::new();
     for table in top.tables("loop", findings) {
         let at = table.span.start;
         found.extend(one_loop(&table, findings).map(|l| (at, RawConstraint::Loop(Box::new(l)))));
     }
-    let lengths: HashSet<&str> = raw.joints.iter().filter(|j| slides(j)).map(|j| j.name.value.as_str()).collect();
+    let sliding = raw.joints.iter().chain(joints).filter(|j| slides(j));
+    let lengths: HashSet<&str> = sliding.map(|j| j.name.value.as_str()).collect();
     for table in top.tables("coupling", findings) {
         let at = table.span.start;
         found.extend(coupling(&table, &lengths, findings).map(|c| (at, RawConstraint::Coupling(c))));

@@ -19,7 +19,7 @@ const CONTACTS: &[&str] = &["pairs", "friction", "restitution", "law"];
 const LAWS: [(&str, RestitutionLaw); 3] =
     [("poisson", RestitutionLaw::Poisson), ("stronge", RestitutionLaw::Stronge), ("newton", RestitutionLaw::Newton)];
 
-/// Shapes, contacts, and what holds for all contacts.
+/// Shapes and contacts.
 pub(super) fn all(top: &Table, raw: &mut RawModel, findings: &mut Findings) {
     for table in top.tables("shape", findings) {
         shape(&table, raw, findings);
@@ -27,6 +27,10 @@ pub(super) fn all(top: &Table, raw: &mut RawModel, findings: &mut Findings) {
     for table in top.tables("contact", findings) {
         contact(&table, raw, findings);
     }
+}
+
+/// What holds for all contacts.
+pub(super) fn surfaces(top: &Table, raw: &mut RawModel, findings: &mut Findings) {
     if let Some(table) = top.table("contacts", findings) {
         table.reject_unknown(CONTACTS, "all contacts", findings);
         let pairs = table.choice("pairs", &["listed", "all"], findings);

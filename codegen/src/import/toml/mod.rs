@@ -6,17 +6,19 @@ mod entries;
 mod kinds;
 mod numbers;
 mod table;
+mod variants;
 
 use ::toml::de::{DeTable, DeValue, Error};
 
 use self::table::Table;
-use super::raw::{RawGravity, RawModel, RawParam, RawValue};
+use super::raw::{RawGravity, RawJoint, RawModel, RawParam, RawValue};
 use super::source::{Findings, Span, Spanned};
 use super::words::quote;
 use super::{Base, ImportOptions};
 
 const KEYS: &[&str] = &[
-    "name", "gravity", "params", "body", "joint", "frame", "wrench", "loop", "coupling", "shape", "contact", "contacts",
+    "name", "gravity", "params", "body", "joint", "frame", "wrench", "loop", "coupling", "shape", "contact",
+    "contacts", "variant",
 ];
 
 /// Reads a model without checking the mechanism; `None` where the text is no TOML. The base in `options` has to be the
@@ -56,21 +58,28 @@ fn document(text: &str, findings: &mut Findings) -> Option<RawModel> {
     if let Some(table) = top.table("params", findings) {
         params(&table, &mut raw, findings);
     }
+    parts(&top, &[], &mut raw, findings);
+    contacts::surfaces(&top, &mut raw, findings);
+    variants::all(&top, &mut raw, findings);
+    Some(raw)
+}
+
+/// All that stands in lists: bodies, joints and what refers to them. `joints` are known besides those in the table.
+fn parts(top: &Table, joints: &[RawJoint], raw: &mut RawModel, findings: &mut Findings) {
     for table in top.tables("body", findings) {
-        entries::body(table, &mut raw, findings);
+        entries::body(table, raw, findings);
     }
     for table in top.tables("joint", findings) {
-        entries::joint(table, &mut raw, findings);
+        entries::joint(table, raw, findings);
     }
     for table in top.tables("frame", findings) {
-        entries::frame(table, &mut raw, findings);
+        entries::frame(table, raw, findings);
     }
     for table in top.tables("wrench", findings) {
-        entries::wrench(table, &mut raw, findings);
+        entries::wrench(table, raw, findings);
     }
-    constraints::all(&top, &mut raw, findings);
-    contacts::all(&top, &mut raw, findings);
-    Some(raw)
+    constraints::all(top, joints, raw, findings);
+    contacts::all(top, raw, findings);
 }
 
 fn gravity(top: &Table, span: Span, value: &DeValue, findings: &mut Findings) -> Option<RawGravity> {
