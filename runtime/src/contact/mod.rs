@@ -10,6 +10,7 @@ mod instant;
 #[cfg(feature = "alloc")]
 mod mode_table;
 mod solver;
+mod stepping;
 mod touching;
 mod with_contacts;
 
@@ -19,6 +20,7 @@ pub use mode_table::{ContactInterpreter, ModeTable, Reducible};
 pub use solver::{
     impact, solve, work_len, Certificate, ContactError, Effort, Impact, ImpactOptions, ImpactOrder, Problem, Touch,
 };
+pub use stepping::{SteppingStatistics, TimeStepping};
 pub use touching::Touching;
 pub use with_contacts::WithContacts;
 

@@ -189,6 +189,16 @@ impl<Y: Touching> WithContacts<Y> {
         self.system.gaps(t, q, v, gaps, velocities, entries);
     }
 
+    /// Gap of contact `k`, m or rad, after [`WithContacts::look`].
+    pub(super) fn gap(&self, k: usize) -> Y::Scalar {
+        self.at.gaps.as_ref()[self.contact(k).row]
+    }
+
+    /// Rate of the gap of contact `k`, m/s or rad/s, after [`WithContacts::look`].
+    pub(super) fn gap_rate(&self, k: usize) -> Y::Scalar {
+        self.at.velocities.as_ref()[self.contact(k).row]
+    }
+
     /// Tangential velocity of contact `k`, m/s, after [`WithContacts::look`].
     pub(super) fn tangential(&self, k: usize) -> [Y::Scalar; 2] {
         let c = self.contact(k);

@@ -149,7 +149,7 @@ fn a_block_that_slides_up_an_incline_comes_back() {
 }
 
 /// A free box with eight corners on the floor.
-fn free_box(friction: f64, restitution: f64) -> Model {
+pub(super) fn free_box(friction: f64, restitution: f64) -> Model {
     let mut model = model(
         r#"
 name = "case"

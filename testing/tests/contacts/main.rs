@@ -4,4 +4,5 @@ mod answers;
 mod known;
 mod round;
 mod scene;
+mod stepping;
 mod walker;

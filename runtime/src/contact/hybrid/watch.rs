@@ -324,16 +324,6 @@ impl<Y: Touching> WithContacts<Y> {
         turns.fold(Y::Scalar::zero(), |sum, (turn, v)| sum + *turn * v.abs())
     }
 
-    /// Gap of contact `k`, m or rad, after [`WithContacts::look`].
-    pub(super) fn gap(&self, k: usize) -> Y::Scalar {
-        self.at.gaps.as_ref()[self.contact(k).row]
-    }
-
-    /// Rate of the gap of contact `k`, m/s or rad/s, after [`WithContacts::look`].
-    pub(super) fn gap_rate(&self, k: usize) -> Y::Scalar {
-        self.at.velocities.as_ref()[self.contact(k).row]
-    }
-
     /// The functions of contact `k`, after [`WithContacts::look`] and, if it is closed, [`WithContacts::loads`].
     fn watched(&self, k: usize) -> Watched<Y::Scalar> {
         let zero = Y::Scalar::zero();

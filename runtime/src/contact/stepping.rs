@@ -1,0 +1,251 @@
+//! Time stepping: the impulses of all contacts of a step at once, without events.
+//!
+//! A step of Moreau's midpoint rule on `(q, p)`: half a step with the velocities at its start gives the place `q_m` where
+//! contacts are looked at; the rates there give the momenta without contacts at the end; impulses of the contacts are
+//! added to them; half a step with the velocities that follow leads to the end (J. J. Moreau, Numerical aspects of the
+//! sweeping process, Comput. Methods Appl. Mech. Eng. 177, 1999).
+//!
+//! A contact takes part where its gap would be closed at the end of the step: `0 ≤ P_n ⊥ v_n + max(g, 0)/(h/2) ≥ 0`, with
+//! its gap `g` at `q_m` and its velocity `v_n` after the impulses, and Coulomb's law on the exact cone. So what lands does
+//! not overlap, but for the curvature of its path. With restitution, a contact waits until its gap at `q_m` is closed, and
+//! then collides as in an [`impact`]; one whose approach is not faster than twice what forces add in a step has none.
+//!
+//! The method is of order 1 at impacts and where slip ends, of order 2 in between. Impulses never add energy: their work is
+//! that of an impact with velocities that approach no slower. What friction holds does not move.
+
+use super::instant::Touches;
+use super::{impact, Certificate, ContactRules, HybridError, ImpactOptions, Touching, WithContacts};
+use crate::constrained::PostStep;
+use crate::error::StepError;
+use crate::integrate::{Chart, Point};
+use crate::system::Real;
+use crate::Scalar;
+
+/// What happened in a motion by time steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct SteppingStatistics {
+    /// Steps.
+    pub steps: u64,
+    /// Steps with impulses.
+    pub touched: u64,
+    /// Steps whose restitution was reduced, so that no energy was gained.
+    pub limited: u64,
+    /// Largest number of contacts with an impulse in a step.
+    pub most: u32,
+    /// Kinetic energy that impulses have taken, J. Where forces press contacts together, this includes the work of these.
+    pub lost: f64,
+    /// Largest relative residual of the impulses of a step.
+    pub residual: f64,
+    /// Largest overlap at the middle of a step, m (rad for stops of rotations).
+    pub overlap: f64,
+}
+
+/// A motion by time steps. The state is the caller's.
+///
+/// `B` closes loops at the ends of steps: a [`Projection`](crate::constrained::Projection).
+#[derive(Clone, Debug)]
+pub struct TimeStepping<Y: Touching, B> {
+    /// Work for the impulses, and their order; other rules have no part in it.
+    pub rules: ContactRules,
+    /// What closes loops.
+    pub post_step: B,
+    chart: Chart<WithContacts<Y>>,
+    start: Point<WithContacts<Y>>,
+    point: Point<WithContacts<Y>>,
+    q: Y::Coordinates,
+    p: Y::Momenta,
+    qd: Y::Coordinates,
+    pd: Y::Momenta,
+    /// Velocities of the rows at the start of the step.
+    before: Y::Rows,
+    touching: Touches<Y>,
+    statistics: SteppingStatistics,
+}
+
+impl<Y, B> TimeStepping<Y, B>
+where
+    Y: Touching,
+    B: PostStep<WithContacts<Y>>,
+{
+    /// For a mechanism, whose contacts are all opened: between steps none of them acts.
+    pub fn new(system: &mut WithContacts<Y>, post_step: B) -> Self {
+        system.open_all();
+        let inner = system.system();
+        TimeStepping {
+            rules: ContactRules::default(),
+            post_step,
+            chart: Chart::new(system, false),
+            start: Point::zero(system),
+            point: Point::zero(system),
+            q: inner.neutral(),
+            p: inner.zero_momenta(),
+            qd: inner.neutral(),
+            pd: inner.zero_momenta(),
+            before: inner.zero_rows(),
+            touching: Touches::new(inner),
+            statistics: SteppingStatistics::default(),
+        }
+    }
+
+    /// What happened so far.
+    pub fn statistics(&self) -> &SteppingStatistics {
+        &self.statistics
+    }
+
+    /// Takes a step of `h` s from time `t` (s).
+    ///
+    /// # Errors
+    /// [`HybridError`]; the state is then as it was.
+    pub fn step(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
+    ) -> Result<(), HybridError> {
+        let half = Y::Scalar::constant(0.5) * h;
+        self.fall(system, t, h, (q, p))?;
+        let middle = t + half;
+        system.look(middle, &self.q, &self.p);
+        self.take(system, half);
+        if self.touching.count > 0 {
+            self.collide(system, middle)?;
+            system.look(middle, &self.q, &self.p);
+        }
+        // Half a step with the velocities that were found; momenta of groups are those of the same motion there.
+        self.chart.load(system, middle.to_f64(), &self.q, &self.p)?;
+        self.displacement(system);
+        self.point.scale(half);
+        let Self { chart, point, .. } = self;
+        if let Some(index) = point.not_finite() {
+            return Err(StepError::NotFinite { time: t.to_f64(), index }.into());
+        }
+        chart.state(system, point, &mut self.q, &mut self.p);
+        let closed = self.post_step.close(system, t + h, false, &mut self.q, &mut self.p);
+        closed.map_err(|error| StepError::Constraint { time: t.to_f64(), error })?;
+        q.as_mut().copy_from_slice(self.q.as_ref());
+        p.as_mut().copy_from_slice(self.p.as_ref());
+        self.statistics.steps += 1;
+        Ok(())
+    }
+
+    /// The middle of the step, and the momenta at its end if no contact acts, in `self.q` and `self.p`; velocities of the
+    /// rows at the start, in `self.before`.
+    fn fall(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        (q, p): (&Y::Coordinates, &Y::Momenta),
+    ) -> Result<(), HybridError> {
+        let half = Y::Scalar::constant(0.5) * h;
+        system.look(t, q, p);
+        self.before.as_mut().copy_from_slice(system.at.velocities.as_ref());
+        self.q.as_mut().copy_from_slice(q.as_ref());
+        self.p.as_mut().copy_from_slice(system.p.as_ref());
+        self.chart.load(system, t.to_f64(), &self.q, &self.p)?;
+        self.start.clear();
+        self.rate_at(system, t);
+        let Self { chart, start, point, q, p, .. } = self;
+        point.scale(half);
+        start.copy_from(point);
+        chart.state(system, start, q, p);
+        self.rate_at(system, t + half);
+        let Self { chart, start, point, q, p, .. } = self;
+        point.scale(h);
+        point.x.as_mut().copy_from_slice(start.x.as_ref());
+        if let Some(index) = point.not_finite() {
+            return Err(StepError::NotFinite { time: t.to_f64(), index }.into());
+        }
+        chart.state(system, point, q, p);
+        Ok(())
+    }
+
+    /// The rate of the displacement at `self.start`, which leads to `self.q` and `self.p`, in `self.point`.
+    fn rate_at(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar) {
+        let Self { chart, start, point, q, p, qd, pd, .. } = self;
+        system.system.rates_at(t, q, p, qd, pd);
+        point.p.as_mut().copy_from_slice(pd.as_ref());
+        chart.rates(system, start, (q, p), qd, point);
+    }
+
+    /// The rate of the coordinates' displacement by the velocities that were looked at last, in `self.point`.
+    fn displacement(&mut self, system: &mut WithContacts<Y>) {
+        let Self { chart, start, point, q, p, qd, .. } = self;
+        system.system.coordinate_rates(q, &system.at.v, qd);
+        start.clear();
+        point.clear();
+        chart.rates(system, start, (q, p), qd, point);
+        // The momenta of the motion are those of the place where it goes on.
+        point.p.as_mut().fill(Y::Scalar::zero());
+    }
+
+    /// Takes the contacts into the problem that would overlap at the end of the step, and those that impulses on others
+    /// might close, with their velocities.
+    fn take(&mut self, system: &WithContacts<Y>, half: Y::Scalar) {
+        let zero = Y::Scalar::zero();
+        let fastest = (0..system.modes().len()).fold(zero, |most, k| {
+            let rate = system.gap_rate(k).abs();
+            if rate > most {
+                rate
+            } else {
+                most
+            }
+        });
+        let near = half * (fastest + fastest);
+        self.touching.count = 0;
+        let mut at = 0;
+        for k in 0..system.modes().len() {
+            let (gap, rate, c) = (system.gap(k), system.gap_rate(k), system.contact(k));
+            let overlap = -gap.to_f64();
+            self.statistics.overlap = self.statistics.overlap.max(overlap);
+            let start = self.before.as_ref()[c.row];
+            // Forces alone change the rate of the gap by `rate − start` in a step.
+            let bounces = c.restitution > zero && start < (rate - start) + (rate - start);
+            let ahead = if bounces || !(gap > zero) { zero } else { gap / half };
+            if (bounces && gap > zero) || !(rate + ahead < zero || gap < near) {
+                continue;
+            }
+            self.touching.take(system, k);
+            let touch = &mut self.touching.problem.as_mut()[self.touching.count - 1];
+            touch.contact.restitution = if bounces { c.restitution } else { zero };
+            for row in c.row..c.row + c.rows() {
+                let shift = if row == c.row { ahead } else { zero };
+                self.touching.b.as_mut()[at] = system.at.velocities.as_ref()[row] + shift;
+                at += 1;
+            }
+        }
+    }
+
+    /// Adds the impulses to the momenta `self.p` at `self.q`, where the system was looked at.
+    fn collide(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar) -> Result<(), HybridError> {
+        let touching = &mut self.touching;
+        touching.assemble(system, t, &self.q);
+        let options = ImpactOptions { effort: self.rules.effort, order: self.rules.order };
+        let (problem, impulses, work) = touching.parts();
+        let result = impact(&problem, &options, impulses, work)
+            .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
+        // The work of the impulses: less than that with the velocities that were asked for, by what is still to be closed.
+        let ahead = touching.order.as_ref()[..touching.count].iter().zip(touching.problem.as_ref());
+        let shift = ahead.fold(Y::Scalar::zero(), |sum, (k, touch)| {
+            let row = touch.contact.row;
+            sum + touching.impulses.as_ref()[row] * (touching.b.as_ref()[row] - system.gap_rate(*k))
+        });
+        system.kick(touching.order(), touching.impulses.as_ref());
+        self.p.as_mut().copy_from_slice(system.p.as_ref());
+        let s = &mut self.statistics;
+        s.touched += 1;
+        s.limited += u64::from(result.limited.is_some());
+        s.most = s.most.max(touching.count as u32);
+        s.lost -= (result.energy - shift).to_f64();
+        s.residual = s.residual.max(residual(&result.certificate));
+        Ok(())
+    }
+}
+
+/// The relative residual of a solution.
+fn residual<S: Real>(certificate: &Certificate<S>) -> f64 {
+    certificate.residual.to_f64()
+}
