@@ -53,7 +53,7 @@ fn a_cut_joint_floats_and_a_cut_loop_is_left_out() {
 fn a_locked_joint_is_prescribed_without_what_acts_on_it() {
     let held = variant("held");
     let [base, locked] = [&read().model.joints[1], &held.joints[1]].map(Clone::clone);
-    assert_eq!((base.motion, locked.motion.clone()), (JointMotion::Free, JointMotion::Prescribed));
+    assert_eq!((base.motion, locked.motion), (JointMotion::Free, JointMotion::Prescribed));
     assert_eq!((base.kind, base.placement), (locked.kind, locked.placement));
     assert!(base.damping[0].constant() == Some(0.5) && locked.damping[0].constant() == Some(0.0));
     assert_eq!(held.starts.iter().filter(|s| s.joint == 1).count(), 0);
