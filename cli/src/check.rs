@@ -18,7 +18,7 @@ pub fn run(args: &CheckArgs, out: &mut dyn Write) -> Outcome {
     }
     let mut worst = Ok(());
     for path in &args.models {
-        match source::model(path, &args.import.import()) {
+        match source::model(path, &args.touch.of(args.import.import())) {
             Ok(model) => match summary(path, &model, out) {
                 Err(Failure::Pipe) => return Err(Failure::Pipe),
                 Err(Failure::Message(what, help)) => {
@@ -81,6 +81,7 @@ fn summary(path: &Path, model: &Model, out: &mut dyn Write) -> Outcome {
         d.nv,
         (mass * 1e9).round() / 1e9,
     );
+    let stops = model.contacts.iter().filter(|c| c.shapes.is_none()).count();
     let follows = plan.slots.iter().filter(|s| s.at.is_none()).count();
     // Elements that the model does not have are not mentioned.
     let counted = [
@@ -88,6 +89,9 @@ fn summary(path: &Path, model: &Model, out: &mut dyn Write) -> Outcome {
         (prescribed.count(), "prescribed joints"),
         (model.params.len(), "parameters"),
         (model.wrenches.len(), "external wrenches"),
+        (model.shapes.len(), "shapes"),
+        (model.contacts.len() - stops, "contacts"),
+        (stops, "stops"),
     ];
     for (n, what) in counted.into_iter().filter(|(n, _)| *n > 0) {
         line += &format!(", {what}: {n}");

@@ -123,7 +123,10 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
         chunk: entry.chunk.unwrap_or(default.chunk).max(1),
     };
     let base = choice("base", &entry.base, Base::from_name).map_err(wrong)?;
-    let model = source::model(&directory.join(&entry.model), &ImportOptions { base, gravity: entry.gravity })?;
+    let model = source::model(
+        &directory.join(&entry.model),
+        &ImportOptions { base, gravity: entry.gravity, ..ImportOptions::default() },
+    )?;
     Ok(codegen::generate(&model, &options).map_err(generate::failure)?.source)
 }
 

@@ -5,8 +5,7 @@ use crate::model::{LoopKind, Mount, Placement, ShapeKind, Value};
 
 /// What [`elementary`] has, for messages.
 pub(super) const SUPPORTED: &str =
-    "a `plane` can touch a `point`, `sphere`, `capsule`, `box` or `cylinder`; a `sphere` or a `point` all but a `point`, a \
-     `capsule` a `capsule`";
+    "a `plane`, `sphere` or `point` can touch shapes of every other kind, a `sphere` or `capsule` also one of its own";
 
 /// One place where two shapes can touch: a loop between two frames, which stand at these origins in the axes of the
 /// shapes, not turned.
@@ -151,5 +150,32 @@ mod tests {
         assert_eq!(elementary(&sphere, &wide), Some(vec![balls(0.1, 0.3)]));
         assert_eq!(elementary(&sphere, &ShapeKind::Point), Some(vec![balls(0.1, 0.0)]));
         assert_eq!(elementary(&ShapeKind::Point, &ShapeKind::Point), None);
+    }
+
+    /// What the messages say about pairs is what there is.
+    #[test]
+    fn pairs_are_those_that_messages_name() {
+        let (radius, length) = (0.1, 0.4);
+        let shapes = [
+            ShapeKind::Plane { normal: Z },
+            ShapeKind::Sphere { radius },
+            ShapeKind::Point,
+            ShapeKind::Capsule { radius, length },
+            ShapeKind::Box { size: [1.0; 3] },
+            ShapeKind::Cylinder { radius, length },
+        ];
+        for (i, a) in shapes.iter().enumerate() {
+            for (j, b) in shapes.iter().enumerate() {
+                let found = elementary(a, b).or_else(|| elementary(b, a)).is_some();
+                let wanted = if i == j { i == 1 || i == 3 } else { i.min(j) <= 2 };
+                assert_eq!(found, wanted, "{} and {}", a.word(), b.word());
+            }
+        }
+        let kind = |a: &ShapeKind, b: &ShapeKind| elementary(a, b).map(|places| places[0].kind);
+        let [lengths, radii] = [[length, 0.0], [radius, 0.3]].map(|x| x.map(Value::Const));
+        let ball = ShapeKind::Sphere { radius: 0.3 };
+        assert_eq!(kind(&shapes[3], &ball), Some(LoopKind::RollingCapsules { axes: [Z; 2], lengths, radii }));
+        let size = [Value::ONE; 3];
+        assert_eq!(kind(&shapes[4], &ShapeKind::Point), Some(LoopKind::RollingBallOnBox { size, radius: Value::ZERO }));
     }
 }

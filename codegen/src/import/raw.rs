@@ -368,6 +368,8 @@ pub struct RawModel {
     pub surface: RawSurface,
     /// Where contacts between all pairs of shapes are asked for.
     pub all_pairs: Option<Span>,
+    /// A shape, by its index, that all other shapes can touch, whatever pairs are asked for.
+    pub floor: Option<usize>,
     /// Whether a body or joint was left out after a finding. Unknown names and bodies without a joint are then not
     /// reported again.
     pub incomplete: bool,
@@ -392,6 +394,7 @@ impl RawModel {
             contacts: Vec::new(),
             surface: RawSurface::default(),
             all_pairs: None,
+            floor: None,
             incomplete: false,
             lenient: false,
         }

@@ -1,7 +1,9 @@
 //! Motions with contacts against their known answers.
 
 mod answers;
+mod edges;
 mod known;
 mod round;
 mod scene;
+mod solid;
 mod walker;
