@@ -23,15 +23,16 @@ fn above<S: Scalar>(x: S) -> S {
     S::one().reciprocal_above(S::one() - x)
 }
 
-/// `x` where it is between `-half` and `half`, the nearest of these two elsewhere.
-fn clamp<S: Scalar>(x: S, half: S) -> S {
-    let (over, under) = (above(x - half), above(-half - x));
-    (S::one() - over - under) * x + (over - under) * half
-}
-
 /// 1 or −1, as the sign of `x`.
 fn sign<S: Scalar>(x: S) -> S {
     S::constant(2.0) * above(x) - S::one()
+}
+
+/// `x` where it is between `-half` and `half`, the nearest of these two elsewhere. Where `half` is zero, so are the result
+/// and its derivative.
+fn clamp<S: Scalar>(x: S, half: S) -> S {
+    let inside = above(half - x) * above(half + x);
+    inside * x + (S::one() - inside) * (sign(x) * half)
 }
 
 impl<S: Scalar> Touch<S> {
