@@ -17,6 +17,9 @@ use roxmltree::Node;
 const IDLE: &str = "a `collision` touches nothing unless a floor is asked for (`--floor` of `mbd simulate`)";
 const MESH: &str = "`mesh` of a `collision` is not used: only box, sphere, cylinder and capsule are read";
 
+/// As many contacts as a shape has with a plane: the corners of a box.
+const CONTACTS: usize = 8;
+
 /// The names of the shapes that were read.
 #[derive(Default)]
 pub(super) struct Taken {
@@ -26,14 +29,22 @@ pub(super) struct Taken {
 }
 
 impl Taken {
-    /// `wanted`, with a number where the identifier that it becomes is taken.
+    /// `wanted`, with a number where an identifier that it becomes is taken: its own, or one of its contacts, which are
+    /// numbered.
     pub(super) fn free(&mut self, wanted: &str) -> String {
+        let of = |name: &str| {
+            let own = identifier(name);
+            (1..=CONTACTS).map(|k| format!("{own}_{k}")).chain([own.clone()]).collect::<Vec<_>>()
+        };
         let mut name = wanted.to_string();
-        while !self.identifiers.insert(identifier(&name)) {
+        let mut all = of(&name);
+        while all.iter().any(|one| self.identifiers.contains(one)) {
             let last = self.last.entry(wanted.to_string()).or_insert(1);
             *last += 1;
-            name = format!("{wanted}_{last}");
+            name = format!("{wanted}_shape_{last}");
+            all = of(&name);
         }
+        self.identifiers.extend(all);
         name
     }
 }

@@ -242,7 +242,7 @@ const TOUCHING: &str = r#"<robot name='r'>
 fn shapes_are_read_and_touch_a_floor_that_is_asked_for() {
     let (free, findings) = model(TOUCHING, Base::Floating);
     let names: Vec<&str> = free.shapes.iter().map(|s| s.name.as_str()).collect();
-    assert_eq!(names, ["base", "base_2", "foot", "foot_2"]);
+    assert_eq!(names, ["base", "base_shape_2", "foot", "foot_shape_2"]);
     let [radius, length] = [0.2, 0.3];
     assert_eq!(free.shapes[0].kind, ShapeKind::Box { size: [1.0, 2.0, 3.0] });
     assert_eq!(free.shapes[1].kind, ShapeKind::Sphere { radius: 0.5 });
@@ -268,9 +268,9 @@ fn shapes_are_read_and_touch_a_floor_that_is_asked_for() {
     let numbered = |name: &str, n: usize| (1..=n).map(|k| format!("floor/{name}/{k}")).collect::<Vec<_>>();
     let wanted = [
         numbered("base", 8),
-        vec!["floor/base_2".to_string()],
+        vec!["floor/base_shape_2".to_string()],
         numbered("foot", 2),
-        numbered("foot_2", 2),
+        numbered("foot_shape_2", 2),
         vec!["j/lower".into(), "j/upper".into()],
     ];
     assert_eq!(contacts, wanted.concat());
