@@ -16,7 +16,7 @@ fn main() {
         println!("cargo:rerun-if-changed={path}");
         let text = std::fs::read_to_string(&path).expect("the model");
         let base = if floating { Base::Floating } else { Base::Fixed };
-        let model = read::model(&path, &text, &ImportOptions { base, gravity: None });
+        let model = read::model(&path, &text, &ImportOptions { base, ..ImportOptions::default() });
         let model = model.unwrap_or_else(|findings| panic!("{findings}")).model;
         for (type_name, arithmetic) in [("Exact", Arithmetic::Exact), ("Fast", Arithmetic::Fast)] {
             let options = Options {

@@ -19,7 +19,7 @@ pub fn run(args: &CheckArgs, out: &mut dyn Write) -> Outcome {
     }
     let mut worst = Ok(());
     for path in &args.models {
-        let checked = source::models(path, &args.import.import()).and_then(|(model, variants)| {
+        let checked = source::models(path, &args.touch.of(args.import.import())).and_then(|(model, variants)| {
             let all = std::iter::once((None, &model)).chain(variants.iter().map(|v| (Some(v.name.as_str()), &v.model)));
             let mut worst = Ok(());
             for (variant, model) in all {
@@ -99,6 +99,7 @@ fn summary(path: &Path, name: &str, model: &Model, out: &mut dyn Write) -> Outco
         d.nv,
         (mass * 1e9).round() / 1e9,
     );
+    let stops = model.contacts.iter().filter(|c| c.shapes.is_none()).count();
     let follows = plan.slots.iter().filter(|s| s.at.is_none()).count();
     // Elements that the model does not have are not mentioned.
     let counted = [
@@ -106,6 +107,9 @@ fn summary(path: &Path, name: &str, model: &Model, out: &mut dyn Write) -> Outco
         (prescribed.count(), "prescribed joints"),
         (model.params.len(), "parameters"),
         (model.wrenches.len(), "external wrenches"),
+        (model.shapes.len(), "shapes"),
+        (model.contacts.len() - stops, "contacts"),
+        (stops, "stops"),
     ];
     for (n, what) in counted.into_iter().filter(|(n, _)| *n > 0) {
         line += &format!(", {what}: {n}");

@@ -35,7 +35,7 @@ const MOST_ROWS: f64 = 1e7;
 /// Runs `mbd simulate`.
 pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     let path = &args.model.model;
-    let mut model = source::model_of(&args.model)?;
+    let mut model = source::model_with(&args.model, &args.touch.of(args.model.import.import()))?;
     let damped = model.joints.iter().any(|j| j.damping.iter().any(|d| *d != Value::ZERO));
     if args.no_damping {
         model.joints.iter_mut().for_each(|j| j.damping.fill(Value::ZERO));

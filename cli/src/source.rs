@@ -76,7 +76,12 @@ fn told<T>(path: &Path, read_text: impl FnOnce(&str, &str) -> (Option<T>, Diagno
 
 /// The model of a command's arguments, with the wrenches they ask for.
 pub fn model_of(args: &ModelArgs) -> Outcome<Model> {
-    let mut model = model(&args.model, &args.import.import(), args.variant.as_deref())?;
+    model_with(args, &args.import.import())
+}
+
+/// The same, read with given options.
+pub fn model_with(args: &ModelArgs, options: &ImportOptions) -> Outcome<Model> {
+    let mut model = model(&args.model, options, args.variant.as_deref())?;
     for name in &args.wrenches {
         let names = model.bodies.iter().map(|b| b.name.as_str());
         let Some(body) = model.bodies.iter().position(|b| b.name == *name) else {

@@ -108,7 +108,8 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
     let group = |name: &String| Output::from_name(name).ok_or_else(|| wrong(format!("`{name}` is no output")));
     let default = Options::default();
     let base = choice("base", &entry.base, Base::from_name).map_err(wrong)?;
-    let model = source::model(&directory.join(&entry.model), &ImportOptions { base, gravity: entry.gravity }, None)?;
+    let import = ImportOptions { base, gravity: entry.gravity, ..ImportOptions::default() };
+    let model = source::model(&directory.join(&entry.model), &import, None)?;
     let modes = entry.modes.as_deref().map(|word| modes::choice(word, directory, &model)).transpose()?;
     let options = Options {
         type_name: type_name(&entry.type_name).map_err(wrong)?,

@@ -84,7 +84,7 @@ fn fuzz(format: &str, seconds: f64, options: &Options) -> usize {
         } else {
             Base::Fixed
         };
-        let (problem, model) = problem(&file, &text, &ImportOptions { base, gravity: None });
+        let (problem, model) = problem(&file, &text, &ImportOptions { base, ..ImportOptions::default() });
         models += u64::from(model);
         if let Some(problem) = problem {
             problems += 1;

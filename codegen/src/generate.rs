@@ -27,10 +27,13 @@ pub struct Generated {
     /// Operations of each function.
     pub counts: Vec<(Output, Counts)>,
     /// Sets of modes of contacts that have functions of their own, with operations of each of these.
-    pub sets: Vec<(Vec<Mode>, Vec<(Output, Counts)>)>,
+    pub sets: Vec<CountsOfModes>,
     /// Notices about changes, such as angles that became right angles.
     pub notices: Vec<String>,
 }
+
+/// Modes of the contacts, and the operations of the functions that were generated for them.
+pub type CountsOfModes = (Vec<Mode>, Vec<(Output, Counts)>);
 
 /// Generates code for a checked model.
 ///

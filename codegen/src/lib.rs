@@ -36,5 +36,6 @@ pub mod wasm;
 pub use import::words;
 
 pub use generate::{
-    generate, transfer_code, Arithmetic, GenerateError, Generated, Options, Output, Precision, RolledCode,
+    generate, transfer_code, Arithmetic, CountsOfModes, GenerateError, Generated, Options, Output, Precision,
+    RolledCode,
 };

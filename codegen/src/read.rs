@@ -10,7 +10,7 @@ use crate::import::{toml, urdf};
 use crate::model::Model;
 use crate::names::rust_name;
 
-pub use crate::import::{Base, ImportOptions};
+pub use crate::import::{Base, Floor, ImportOptions};
 
 /// A model that was read.
 #[derive(Clone, Debug, PartialEq)]
@@ -204,15 +204,15 @@ mod tests {
 
     #[test]
     fn options_apply_to_toml() {
-        let gravity = |g| model("m.toml", TEXT, &ImportOptions { gravity: Some(g), base: Base::Fixed });
+        let gravity = |g| model("m.toml", TEXT, &ImportOptions { gravity: Some(g), ..ImportOptions::default() });
         let read = gravity([0.0, -1.62, 0.0]).expect("a model");
         assert_eq!(read.findings.0, []);
         let wanted = Gravity::Constant([Value::Const(0.0), Value::Const(-1.62), Value::Const(0.0)]);
         assert_eq!(read.model.gravity, wanted);
         let findings = gravity([0.0, f64::NAN, 0.0]).expect_err("a refusal");
         assert!(findings.to_string().contains("gravity"), "{findings}");
-        let findings =
-            model("m.toml", TEXT, &ImportOptions { base: Base::Floating, gravity: None }).expect_err("a refusal");
+        let findings = model("m.toml", TEXT, &ImportOptions { base: Base::Floating, ..ImportOptions::default() })
+            .expect_err("a refusal");
         assert!(findings.to_string().contains("states its own base"), "{findings}");
     }
 }

@@ -161,7 +161,11 @@ impl Text {
         let base = args.base.map_or(Base::default(), |(base, _)| base);
         // This is reported at the argument itself.
         let base = if self.is_toml() { Base::default() } else { base };
-        let (model, findings) = load_all(&self.label, &self.text, &ImportOptions { base, gravity: args.gravity });
+        let (model, findings) = load_all(
+            &self.label,
+            &self.text,
+            &ImportOptions { base, gravity: args.gravity, ..ImportOptions::default() },
+        );
         (model, findings.0)
     }
 

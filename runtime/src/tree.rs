@@ -283,6 +283,28 @@ pub enum Closure<S> {
         /// Radii of the first and the second, m.
         radii: [S; 2],
     },
+    /// A capsule about z of the second frame, with its middle at the origin, rolls on one about z of the first. Where a
+    /// length is zero, it is a ball.
+    RollingCapsules {
+        /// Lengths of the straight parts of the first and the second, m.
+        lengths: [S; 2],
+        /// Radii of the first and the second, m.
+        radii: [S; 2],
+    },
+    /// A ball about the second origin rolls on a box about the first, with its edges along the axes.
+    RollingBallOnBox {
+        /// Lengths of the edges of the box, m.
+        size: [S; 3],
+        /// Radius of the ball, m.
+        radius: S,
+    },
+    /// A ball about the second origin rolls on a cylinder about z of the first frame, with its middle at the origin.
+    RollingBallOnCylinder {
+        /// Length of the cylinder, m.
+        length: S,
+        /// Radii of the cylinder and the ball, m.
+        radii: [S; 2],
+    },
     /// No velocity of the second origin along z of the second frame.
     KnifeEdge,
     /// One linear condition on the relative motion.

@@ -12,6 +12,7 @@ use mbd_runtime::tree::Source;
 use crate::kkt::{across, mounted, rank, unit, Pose, Rows};
 use crate::random::{random_model, rotation_matrix, Distribution, Rng};
 use crate::state::{random_state, State};
+use crate::touching;
 use crate::value;
 
 /// Distribution of the constraints of a random mechanism.
@@ -31,7 +32,7 @@ pub struct LoopKnobs {
     /// Probability that a constraint couples joints.
     pub coupling: f64,
     /// Weights of the kinds of loops, in the order of [`LoopKind`].
-    pub kinds: [f64; 17],
+    pub kinds: [f64; 20],
     /// Probability that a constraint has a `decay`.
     pub decay: f64,
     /// Probability that a loop may leave its joints no motion.
@@ -48,7 +49,7 @@ impl LoopKnobs {
             ground: 0.6,
             twice: 0.0,
             coupling: 0.1,
-            kinds: [1.0; 17],
+            kinds: [1.0; 20],
             decay: 0.0,
             locked: 0.0,
         }
@@ -67,8 +68,8 @@ impl LoopKnobs {
             tree.massless = 0.0;
         }
         let few = rng.chance(0.4);
-        let kinds: [f64; 17] = std::array::from_fn(|_| if few && rng.chance(0.7) { 0.0 } else { 1.0 });
-        let kinds = if kinds.iter().all(|w| *w == 0.0) { [1.0; 17] } else { kinds };
+        let kinds: [f64; 20] = std::array::from_fn(|_| if few && rng.chance(0.7) { 0.0 } else { 1.0 });
+        let kinds = if kinds.iter().all(|w| *w == 0.0) { [1.0; 20] } else { kinds };
         LoopKnobs {
             tree,
             planar,
@@ -373,7 +374,21 @@ impl Closer<'_> {
             12 => LoopKind::RollingDisc { normal: self.sideways(), axis: self.direction(), radius: self.value(length) },
             13 => LoopKind::RollingBall { normal: self.sideways(), radius: self.value(length) },
             14 => LoopKind::RollingBalls { radii: [0.4, 0.6].map(|part| self.value(part * length)) },
-            15 => LoopKind::KnifeEdge { axis: self.sideways() },
+            15 => {
+                let axes = [self.sideways(), self.sideways()];
+                let parts = self.rng.pick(&[[0.5, 0.7], [0.8, 0.0]]);
+                let lengths = parts.map(|part| self.value(part * length));
+                LoopKind::RollingCapsules { axes, lengths, radii: [0.4, 0.6].map(|part| self.value(part * length)) }
+            }
+            16 => {
+                let size = [0.5, 0.7, 0.9].map(|part| self.value(part * length));
+                LoopKind::RollingBallOnBox { size, radius: self.value(0.5 * length) }
+            }
+            17 => {
+                let (axis, radii) = (self.direction(), [0.4, 0.6].map(|part| self.value(part * length)));
+                LoopKind::RollingBallOnCylinder { axis, length: self.value(length), radii }
+            }
+            18 => LoopKind::KnifeEdge { axis: self.sideways() },
             _ => {
                 let row: [f64; 6] = std::array::from_fn(|_| self.rng.around(1.0));
                 LoopKind::Pfaffian { row: row.map(|x| self.value(x)) }
@@ -429,6 +444,24 @@ impl Closer<'_> {
                 (self.any_turn(), add3(along(normal, num(radius)), level(self, normal)))
             }
             LoopKind::RollingBalls { radii: [a, b] } => (self.any_turn(), along(self.sideways(), num(a) + num(b))),
+            LoopKind::RollingCapsules { axes: [a, b], lengths, radii } => loop {
+                let (turn, normal) = (self.any_turn(), self.sideways());
+                let axes = [unit(a), turn.map(|row| dot3(row, unit(b)))];
+                let half = lengths.map(|x| 0.5 * num(x));
+                let flat = self.distribution.planar;
+                if let Some(d) = touching::capsules(&mut self.rng, axes, half, radii.map(num), normal, flat) {
+                    break (turn, d);
+                }
+            },
+            LoopKind::RollingBallOnBox { size, radius } => {
+                let turn = self.any_turn();
+                (turn, touching::on_box(&mut self.rng, size.map(num), num(radius), self.distribution.planar))
+            }
+            LoopKind::RollingBallOnCylinder { axis, length, radii } => {
+                let turn = self.any_turn();
+                let (length, flat) = (num(length), self.distribution.planar);
+                (turn, touching::on_cylinder(&mut self.rng, axis, length, radii.map(num), flat))
+            }
             LoopKind::KnifeEdge { .. } | LoopKind::Pfaffian { .. } => {
                 let anywhere = self.direction();
                 (self.any_turn(), along(anywhere, slide))

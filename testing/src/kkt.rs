@@ -7,8 +7,9 @@ use mbd_codegen::plan::Plan;
 use mbd_runtime::spatial::{add3, cross, dot3, scale3, Mat3, Vec3};
 use mbd_runtime::sweep::FrameState;
 use mbd_runtime::tree::Source;
-use mbd_runtime::{Dual, Interpreter, Scalar, System};
+use mbd_runtime::{Dual, Interpreter, Real, Scalar, System};
 
+use crate::nearest::{on_box, on_cylinder, segments, Nearest};
 use crate::newton::body_frames;
 use crate::random::rotation_matrix;
 use crate::state::State;
@@ -93,7 +94,7 @@ pub fn mounted<S: Scalar>(plan: &Plan, params: &[f64], frames: &[FrameState<S>],
 
 /// Residuals, which are zero at closed positions. Their number depends on the kind of loop only and may differ from the
 /// number of rows in [`rates`].
-pub fn residuals<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S>) -> Vec<S> {
+pub fn residuals<S: Real>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S>) -> Vec<S> {
     let d = less(b.origin, a.origin);
     let num = |x: mbd_codegen::model::Value| S::constant(value(x, params));
     let along = |n: Vec3<f64>| dot3(a.direction(n), d);
@@ -133,6 +134,12 @@ pub fn residuals<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Po
         }
         LoopKind::RollingBall { normal, radius } => vec![along(unit(normal)) - num(radius)],
         LoopKind::RollingBalls { radii: [p, q] } => vec![length(d) - num(p) - num(q)],
+        LoopKind::RollingCapsules { .. }
+        | LoopKind::RollingBallOnBox { .. }
+        | LoopKind::RollingBallOnCylinder { .. } => touching(kind, params, a, b)
+            .map(|(nearest, [p, q])| length(nearest.apart) - S::constant(p) - S::constant(q))
+            .into_iter()
+            .collect(),
         LoopKind::KnifeEdge { .. } | LoopKind::Pfaffian { .. } => Vec::new(),
     }
 }
@@ -145,7 +152,7 @@ fn turned<S: Scalar>(a: &Pose<S>, b: &Pose<S>) -> Vec<S> {
 
 /// Rates of all rows at closed positions: first the rates of [`residuals`], in their order, then the rows that
 /// constrain velocities only.
-pub fn rates<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S>) -> Vec<S> {
+pub fn rates<S: Real>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S>) -> Vec<S> {
     let d = less(b.origin, a.origin);
     let num = |x: mbd_codegen::model::Value| S::constant(value(x, params));
     // Velocity of the second origin and angular velocity of the second frame relative to the first, in ground axes.
@@ -195,11 +202,42 @@ pub fn rates<S: Scalar>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S
             let share = num(q) / (num(p) + num(q));
             meeting(d, add3(v, cross(w, scale3(-share, d))))
         }
+        LoopKind::RollingCapsules { .. }
+        | LoopKind::RollingBallOnBox { .. }
+        | LoopKind::RollingBallOnCylinder { .. } => touching(kind, params, a, b)
+            .map(|(Nearest { apart, arm }, [_, radius])| {
+                let back = scale3(-S::constant(radius) / dot3(apart, apart).sqrt(), apart);
+                meeting(apart, add3(v, cross(w, add3(arm, back))))
+            })
+            .unwrap_or_default(),
         LoopKind::KnifeEdge { axis } => vec![dot3(b.direction(unit(axis)), v)],
         LoopKind::Pfaffian { row } => {
             let [x, y, z, p, q, r] = row.map(num);
             vec![dot3(b.turn([x, y, z]), v) + dot3(b.turn([p, q, r]), w)]
         }
+    }
+}
+
+/// The nearest points of the parts of two bodies that balls of some radii pass along, m; `None` for other kinds.
+fn touching<S: Real>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S>) -> Option<(Nearest<S>, [f64; 2])> {
+    let d = less(b.origin, a.origin);
+    let num = |x: mbd_codegen::model::Value| value(x, params);
+    let half = |x: mbd_codegen::model::Value| S::constant(0.5 * num(x));
+    match *kind {
+        LoopKind::RollingCapsules { axes: [p, q], lengths, radii } => {
+            let axes = [a.direction(unit(p)), b.direction(unit(q))];
+            Some((segments(axes, lengths.map(half), d), radii.map(num)))
+        }
+        LoopKind::RollingBallOnBox { size, radius } => {
+            let e = |k: usize| std::array::from_fn(|i| f64::from(u8::from(i == k)));
+            let axes = [0, 1, 2].map(|k| a.direction(e(k)));
+            Some((on_box(axes, size.map(half), d), [0.0, num(radius)]))
+        }
+        LoopKind::RollingBallOnCylinder { axis, length, radii: [p, q] } => {
+            let nearest = on_cylinder(a.direction(unit(axis)), half(length), S::constant(num(p)), d);
+            Some((nearest, [0.0, num(q)]))
+        }
+        _ => None,
     }
 }
 
@@ -251,7 +289,7 @@ impl Rows<'_> {
     }
 
     /// Residuals of all constraints, one list for each.
-    pub fn residuals<S: Scalar>(&self, i: &mut Interpreter<S>, q: &[S]) -> Vec<Vec<S>> {
+    pub fn residuals<S: Real>(&self, i: &mut Interpreter<S>, q: &[S]) -> Vec<Vec<S>> {
         let still = vec![S::zero(); self.plan.dims.nv];
         let poses = self.poses(i, q, &still);
         let params = &self.state.params;
@@ -266,7 +304,7 @@ impl Rows<'_> {
     }
 
     /// Rates of all rows at the velocities `v` of the state and at the velocities of the drives, which `i` contains.
-    pub fn rates<S: Scalar>(&self, i: &mut Interpreter<S>, q: &[S], v: &[S]) -> Vec<Vec<S>> {
+    pub fn rates<S: Real>(&self, i: &mut Interpreter<S>, q: &[S], v: &[S]) -> Vec<Vec<S>> {
         let poses = self.poses(i, q, v);
         let params = &self.state.params;
         let one = |(c, poses): (&mbd_codegen::model::Constraint, Option<[Pose<S>; 2]>)| match (&c.kind, poses) {

@@ -7,10 +7,12 @@ pub mod conformance;
 pub mod eliminations;
 pub mod kkt;
 pub mod motions;
+pub mod nearest;
 pub mod newton;
 pub mod random;
 pub mod state;
 pub mod toml;
+mod touching;
 
 use mbd_codegen::model::{ConstraintKind, Gravity, JointMotion, Model, Placement, Rotation, Value};
 

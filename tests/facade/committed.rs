@@ -23,7 +23,7 @@ const STATES: u64 = 20;
 /// A plan and its interpreter, with the default options of the generator.
 fn interpreter(file: &str, base: Base) -> (Plan, Interpreter<f64>) {
     let text = std::fs::read_to_string(format!("{}/{file}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
-    let read = read::model(file, &text, &ImportOptions { base, gravity: None })
+    let read = read::model(file, &text, &ImportOptions { base, ..ImportOptions::default() })
         .unwrap_or_else(|findings| panic!("{findings}"));
     let plan = search::plan(&read.model, PlanOptions::default());
     let params = plan.default_params();

@@ -25,7 +25,9 @@ fn file(name: &str, base: Base, gravity: Option<[f64; 3]>) -> Model {
 }
 
 fn read(name: &str, text: &str, base: Base, gravity: Option<[f64; 3]>) -> Model {
-    read::model(name, text, &ImportOptions { base, gravity }).unwrap_or_else(|findings| panic!("{findings}")).model
+    read::model(name, text, &ImportOptions { base, gravity, ..ImportOptions::default() })
+        .unwrap_or_else(|findings| panic!("{findings}"))
+        .model
 }
 
 /// The operations that are counted.

@@ -83,8 +83,9 @@ fn newton_converges_quadratically_in_implicit_steps() {
     assert!((after - before).abs() < 1e-2 * before.abs().max(1.0), "{before} {after}");
 
     let text = std::fs::read_to_string("models/double_pendulum.toml").expect("the model");
-    let read = read::model("double_pendulum.toml", &text, &ImportOptions { base: Base::Fixed, gravity: None })
-        .unwrap_or_else(|findings| panic!("{findings}"));
+    let read =
+        read::model("double_pendulum.toml", &text, &ImportOptions { base: Base::Fixed, ..ImportOptions::default() })
+            .unwrap_or_else(|findings| panic!("{findings}"));
     let plan = search::plan(&read.model, Default::default());
     let mut interpreter = Interpreter::new(plan.tree::<f64>(&[]), plan.gravity(&[]));
     for _ in 0..200 {

@@ -76,7 +76,7 @@ mod warned {
 
 fn interpreter(file: &str, base: Base) -> Interpreter<f64> {
     let text = std::fs::read_to_string(format!("{}/{file}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
-    let read = read::model(file, &text, &ImportOptions { base, gravity: None })
+    let read = read::model(file, &text, &ImportOptions { base, ..ImportOptions::default() })
         .unwrap_or_else(|findings| panic!("{findings}"));
     let plan = search::plan(&read.model, PlanOptions::default());
     plan.interpreter(&plan.default_params())

@@ -48,7 +48,7 @@ impl Case {
             _ => Base::Fixed,
         };
         let model_text = std::fs::read_to_string(format!("{root}/{file}")).expect("the model");
-        let mut model = read::model(file, &model_text, &ImportOptions { base, gravity: None })
+        let mut model = read::model(file, &model_text, &ImportOptions { base, ..ImportOptions::default() })
             .unwrap_or_else(|findings| panic!("{name}: {findings}"))
             .model;
         for wrench in data["wrenches"].as_array().expect("wrenches") {

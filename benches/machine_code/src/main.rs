@@ -90,7 +90,7 @@ where
 fn compiled(path: &str, floating: bool, arithmetic: Arithmetic) -> Compiled {
     let text = std::fs::read_to_string(format!("{}/{path}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
     let base = if floating { Base::Floating } else { Base::Fixed };
-    let model = read::model(path, &text, &ImportOptions { base, gravity: None }).expect("checked by the build").model;
+    let model = read::model(path, &text, &ImportOptions { base, ..ImportOptions::default() }).expect("checked by the build").model;
     let compiled = Compiled::new(&model, &Options { arithmetic, ..Options::default() }).expect("options");
     compiled.prepare(Output::Rates).expect("machine code");
     compiled

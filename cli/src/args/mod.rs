@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use multibody::codegen::options::DEFAULT_SNAP;
-use multibody::codegen::read::{Base, ImportOptions};
+use multibody::codegen::read::{Base, Floor, ImportOptions};
 use multibody::runtime::constrained::Stabilisation;
 use values::{choice, finite, methods, one_of, positive, snap, vector};
 
@@ -79,7 +79,29 @@ pub struct ImportArgs {
 impl ImportArgs {
     /// Options for the readers.
     pub fn import(&self) -> ImportOptions {
-        ImportOptions { base: self.base, gravity: self.gravity }
+        ImportOptions { base: self.base, gravity: self.gravity, ..ImportOptions::default() }
+    }
+}
+
+/// What a robot touches: options of the readers, for commands to which it makes a difference.
+#[derive(Args, Clone, Copy)]
+pub struct TouchArgs {
+    /// Make stops of the joint limits of a URDF; a TOML model states them itself
+    #[arg(long)]
+    pub limits: bool,
+    /// Put a floor at this height that the collision shapes of a URDF touch, m
+    #[arg(long, value_name = "Z", allow_hyphen_values = true, value_parser = finite)]
+    pub floor: Option<f64>,
+    /// Coefficient of friction on that floor
+    #[arg(long, value_name = "MU", default_value_t = 0.5, value_parser = finite, requires = "floor")]
+    pub friction: f64,
+}
+
+impl TouchArgs {
+    /// The same options for the readers, with these.
+    pub fn of(&self, import: ImportOptions) -> ImportOptions {
+        let floor = self.floor.map(|height| Floor { height, friction: self.friction });
+        ImportOptions { limits: self.limits, floor, ..import }
     }
 }
 
@@ -112,6 +134,8 @@ pub struct CheckArgs {
     pub models: Vec<PathBuf>,
     #[command(flatten)]
     pub import: ImportArgs,
+    #[command(flatten)]
+    pub touch: TouchArgs,
     /// Check the generated files of a directory with a manifest.toml instead
     #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = "generated", conflicts_with = "models")]
     pub generated: Option<PathBuf>,
@@ -269,6 +293,8 @@ metre, steps that do not follow the motion, energy that is lost, and with --trus
 pub struct SimulateArgs {
     #[command(flatten)]
     pub model: ModelArgs,
+    #[command(flatten)]
+    pub touch: TouchArgs,
     /// Length of the simulation, s
     #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = positive)]
     pub time: f64,

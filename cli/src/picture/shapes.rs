@@ -107,8 +107,12 @@ impl Shapes {
             match *kind {
                 LoopKind::RollingDisc { axis, radius, .. } => discs.push((second, axis, number(radius))),
                 LoopKind::RollingBall { radius, .. } => discs.push((second, [0.0, 1.0, 0.0], number(radius))),
-                LoopKind::RollingBalls { radii } => {
+                LoopKind::RollingBalls { radii } | LoopKind::RollingCapsules { radii, .. } => {
                     discs.extend([first, second].into_iter().zip(radii).map(|(m, r)| (m, [0.0, 1.0, 0.0], number(r))));
+                }
+                LoopKind::RollingBallOnBox { radius, .. }
+                | LoopKind::RollingBallOnCylinder { radii: [_, radius], .. } => {
+                    discs.push((second, [0.0, 1.0, 0.0], number(radius)));
                 }
                 LoopKind::KnifeEdge { .. } | LoopKind::Pfaffian { .. } => {}
                 LoopKind::Distance { .. } => {

@@ -102,3 +102,58 @@ fn machine_code_and_interpreter_give_the_same_motion() {
     });
     assert_eq!(tables[0], tables[1]);
 }
+
+/// It rolls to the edge, opens there before it turns to the side, bounces on the floor, and stays on it.
+#[test]
+fn a_ball_rolls_off_a_box() {
+    let folder = folder("contacts_box");
+    let output = good(run_in(&folder, &["simulate", &shipped("ball_on_box"), "--time", "4"]));
+    for word in ["top lands at", "top opens", "ground lands at", "contacts at the end: ground sticks"] {
+        assert!(out(&output).contains(word), "{word}: {}", out(&output));
+    }
+}
+
+/// A leg with a foot on a slide, in URDF.
+const LEG: &str = r#"<robot name="leg">
+  <link name="hip"><inertial><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="shank">
+    <inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0 0 -0.3"/><geometry><sphere radius="0.05"/></geometry></collision>
+    <collision><geometry><mesh filename="shank.stl"/></geometry></collision>
+  </link>
+  <link name="rail"/>
+  <joint name="height" type="prismatic"><parent link="rail"/><child link="hip"/><axis xyz="0 0 1"/></joint>
+  <joint name="knee" type="prismatic">
+    <parent link="hip"/><child link="shank"/><axis xyz="0 0 1"/>
+    <limit lower="-0.1" upper="0.2" effort="10" velocity="1"/>
+  </joint>
+</robot>"#;
+
+/// Shapes and limits of a robot act where they are asked for, and nowhere else.
+#[test]
+fn robots_touch_a_floor_that_is_asked_for() {
+    let folder = folder("contacts_urdf");
+    std::fs::write(folder.join("leg.urdf"), LEG).expect("a file");
+    let simulate = |more: &[&str]| run_in(&folder, &[&["simulate", "leg.urdf", "--time", "0.5"][..], more].concat());
+    let free = good(simulate(&[]));
+    assert!(!out(&free).contains("events:"), "{}", out(&free));
+    // The foot is 0.35 m below the hip and falls 0.45 m; then the hip falls on, to the stop.
+    let floor = good(simulate(&["--floor", "-0.8", "--friction", "0.3", "--limits"]));
+    let speed = (2.0_f64 * 9.81 * 0.45).sqrt();
+    let stop = (2.0_f64 * 9.81 * 0.65).sqrt();
+    for landing in [
+        format!("floor/shank lands at {speed:.6} m/s, then sticks"),
+        format!("knee/upper lands at {stop:.6} m/s, then closed"),
+    ] {
+        assert!(out(&floor).contains(&landing), "{landing}: {}", out(&floor));
+    }
+    let check = |more: &[&str]| good(run_in(&folder, &[&["check", "leg.urdf"][..], more].concat()));
+    let plain = check(&[]);
+    assert!(out(&plain).contains("shapes: 1") && !out(&plain).contains("contacts:"), "{}", out(&plain));
+    assert!(crate::run::err(&plain).contains("`mesh` of a `collision` is not used"));
+    let full = check(&["--floor", "-0.8", "--limits"]);
+    assert!(out(&full).contains("shapes: 2, contacts: 1, stops: 2"), "{}", out(&full));
+    let toml = ["check", &shipped("bouncing_ball"), "--limits"];
+    bad(run_in(&folder, &toml), &["a TOML model states its own limits and contacts"]);
+    assert_eq!(run_in(&folder, &["check", "leg.urdf", "--friction", "0.3"]).status.code(), Some(2));
+}

@@ -45,7 +45,7 @@ pub fn fmu(model: &Model, options: &Options) -> Result<Fmu, GenerateError> {
     let options = Options { outputs, precision: Precision::F64, frames: Vec::new(), ..options.clone() };
     let plan = &search::plan(model, options.searches());
     if options.modes.is_some() {
-        return Err(GenerateError::ModesNeedRust.into());
+        return Err(GenerateError::ModesNeedRust);
     }
     let programs = Programs::new(plan, &options)?;
     let input = Input { plan, options: &options, programs: &programs };

@@ -125,9 +125,15 @@ pub(super) fn between(
                 unsupported(&pair, [first, second], findings);
                 Vec::new()
             }));
+            if catches([first, second]) {
+                let what = format!("contact {}", quote(&pair.name.value));
+                let message = format!("{what}: a point is caught by an edge that it slides over");
+                findings.warning(pair.at, message, SMALL);
+            }
         }
     }
-    if let Some(span) = raw.all_pairs {
+    let every = raw.all_pairs.or(raw.floor.map(|_| Span::FILE));
+    if let Some(span) = every {
         let neighbours = neighbours(joints, &welded);
         let far = |a: &Shape, b: &Shape| {
             let of = |root: &[Option<usize>], s: &Shape| s.mount.body.and_then(|b| root[b]);
@@ -220,15 +226,15 @@ impl Pair {
 fn unsupported(pair: &Pair, [a, b]: [&Shape; 2], findings: &mut Findings) {
     let what = format!("contact {}", quote(&pair.name.value));
     let message = format!("{what}: a {} and a {} cannot touch", a.kind.word(), b.kind.word());
-    let box_and_plane = matches!(a.kind, ShapeKind::Box { .. } | ShapeKind::Cylinder { .. });
-    let help = match box_and_plane || a.kind == b.kind {
-        true => format!("{SUPPORTED}; describe one of the two by spheres or points"),
-        false => SUPPORTED.into(),
+    let simple = |s: &Shape| matches!(s.kind, ShapeKind::Plane { .. } | ShapeKind::Point);
+    let help = match simple(a) || simple(b) {
+        true => SUPPORTED.into(),
+        false => format!("{SUPPORTED}; describe one of the two by spheres or points"),
     };
     findings.error(pair.at, message, help);
 }
 
-/// Contacts of every pair of shapes for which `far` holds, without those that are `listed`.
+/// Contacts of every pair of shapes that is asked for and for which `far` holds, without those that are `listed`.
 fn all(
     raw: &RawModel,
     shapes: &[Option<Shape>],
@@ -238,15 +244,19 @@ fn all(
     far: &dyn Fn(&Shape, &Shape) -> bool,
     findings: &mut Findings,
 ) -> Vec<Contact> {
-    let (mut contacts, mut left_out) = (Vec::new(), Vec::new());
+    let (mut contacts, mut left_out, mut caught) = (Vec::new(), Vec::new(), Vec::new());
     for (j, second) in shapes.iter().enumerate() {
         for (i, first) in shapes[..j].iter().enumerate() {
             let (Some(a), Some(b)) = (first, second) else { continue };
-            if listed.contains(&[i, j]) || !far(a, b) {
+            let asked = raw.all_pairs.is_some() || raw.floor.is_some_and(|floor| floor == i || floor == j);
+            if !asked || listed.contains(&[i, j]) || !far(a, b) {
                 continue;
             }
             let name = Spanned::new(format!("{}/{}", a.name, b.name), raw.shapes[j].name.span);
             let pair = Pair { name, shapes: [i, j], surface, at: span };
+            if catches([a, b]) {
+                caught.push(pair.name.value.clone());
+            }
             match pair.contacts([a, b], findings) {
                 Some(found) => contacts.extend(found),
                 None => left_out.push(pair.name.value),
@@ -258,7 +268,21 @@ fn all(
         let message = format!("{n} pair{} of shapes cannot touch: {names}", if n == 1 { "" } else { "s" });
         findings.warning(span, message, SUPPORTED);
     }
+    if !caught.is_empty() {
+        let names = list(caught.iter().map(String::as_str));
+        findings.warning(span, format!("points are caught by edges that they slide over: {names}"), SMALL);
+    }
     contacts
+}
+
+/// What to do about points at edges.
+const SMALL: &str = "where it can get to an edge, make the point a `sphere` with a small radius";
+
+/// Whether one of two shapes is a point, which has no radius with which it could turn about an edge of the other.
+fn catches([a, b]: [&Shape; 2]) -> bool {
+    let point = |s: &Shape| s.kind == ShapeKind::Point;
+    let edged = |s: &Shape| matches!(s.kind, ShapeKind::Box { .. } | ShapeKind::Cylinder { .. });
+    (point(a) && edged(b)) || (edged(a) && point(b))
 }
 
 /// Pairs of bodies (as roots of what is welded together) that one joint connects. A joint to the ground that lets its

@@ -5,7 +5,7 @@ use crate::model::{LoopKind, Mount, Placement, ShapeKind, Value};
 
 /// What [`elementary`] has, for messages.
 pub(super) const SUPPORTED: &str =
-    "a `plane` can touch a `point`, `sphere`, `capsule`, `box` or `cylinder`, a `sphere` a `point` or `sphere`";
+    "a `plane`, `sphere` or `point` can touch shapes of every other kind, a `sphere` or `capsule` also one of its own";
 
 /// One place where two shapes can touch: a loop between two frames, which stand at these origins in the axes of the
 /// shapes, not turned.
@@ -20,6 +20,7 @@ pub(super) struct Elementary {
 }
 
 const MIDDLE: [f64; 3] = [0.0; 3];
+const Z: [f64; 3] = [0.0, 0.0, 1.0];
 
 /// The places where the first shape can touch the second; `None` for pairs that are not supported in this order.
 pub(super) fn elementary(first: &ShapeKind, second: &ShapeKind) -> Option<Vec<Elementary>> {
@@ -33,14 +34,36 @@ pub(super) fn elementary(first: &ShapeKind, second: &ShapeKind) -> Option<Vec<El
             corners(size).into_iter().map(|at| ball(normal, 0.0, at)).collect()
         }
         (ShapeKind::Plane { normal }, ShapeKind::Cylinder { radius, length }) => {
-            let kind = LoopKind::RollingDisc { normal, axis: [0.0, 0.0, 1.0], radius: Value::Const(radius) };
+            let kind = LoopKind::RollingDisc { normal, axis: Z, radius: Value::Const(radius) };
             ends(length).into_iter().map(|at| Elementary { kind, first: MIDDLE, second: at }).collect()
         }
-        (ShapeKind::Sphere { radius }, ShapeKind::Point) => vec![balls(radius, 0.0)],
-        (ShapeKind::Sphere { radius: first }, ShapeKind::Sphere { radius: second }) => vec![balls(first, second)],
+        (ShapeKind::Sphere { radius: first }, second) => vec![balls(first, ball_of(&second)?)],
+        (ShapeKind::Capsule { radius: first, length }, ShapeKind::Capsule { radius: second, length: other }) => {
+            vec![capsules([length, other], [first, second])]
+        }
+        (ShapeKind::Capsule { radius: first, length }, second) => {
+            vec![capsules([length, 0.0], [first, ball_of(&second)?])]
+        }
+        (ShapeKind::Box { size }, second) => {
+            let radius = Value::Const(ball_of(&second)?);
+            vec![middles(LoopKind::RollingBallOnBox { size: size.map(Value::Const), radius })]
+        }
+        (ShapeKind::Cylinder { radius: first, length }, second) => {
+            let (length, radii) = (Value::Const(length), [first, ball_of(&second)?].map(Value::Const));
+            vec![middles(LoopKind::RollingBallOnCylinder { axis: Z, length, radii })]
+        }
         _ => return None,
     };
     Some(places)
+}
+
+/// Radius of a shape that is a ball about its origin, 0 for a point; `None` for others.
+fn ball_of(shape: &ShapeKind) -> Option<f64> {
+    match shape {
+        ShapeKind::Point => Some(0.0),
+        ShapeKind::Sphere { radius } => Some(*radius),
+        _ => None,
+    }
 }
 
 /// A ball about a place of the second shape on the plane of the first.
@@ -51,7 +74,17 @@ fn ball(normal: [f64; 3], radius: f64, second: [f64; 3]) -> Elementary {
 
 /// A ball about the middle of the second shape on one about the middle of the first.
 fn balls(first: f64, second: f64) -> Elementary {
-    let kind = LoopKind::RollingBalls { radii: [first, second].map(Value::Const) };
+    middles(LoopKind::RollingBalls { radii: [first, second].map(Value::Const) })
+}
+
+/// Capsules about the middles of the shapes; balls where a length is zero.
+fn capsules(lengths: [f64; 2], radii: [f64; 2]) -> Elementary {
+    let [lengths, radii] = [lengths, radii].map(|x| x.map(Value::Const));
+    middles(LoopKind::RollingCapsules { axes: [Z; 2], lengths, radii })
+}
+
+/// A loop between the middles of both shapes.
+fn middles(kind: LoopKind) -> Elementary {
     Elementary { kind, first: MIDDLE, second: MIDDLE }
 }
 
@@ -117,5 +150,32 @@ mod tests {
         assert_eq!(elementary(&sphere, &wide), Some(vec![balls(0.1, 0.3)]));
         assert_eq!(elementary(&sphere, &ShapeKind::Point), Some(vec![balls(0.1, 0.0)]));
         assert_eq!(elementary(&ShapeKind::Point, &ShapeKind::Point), None);
+    }
+
+    /// What the messages say about pairs is what there is.
+    #[test]
+    fn pairs_are_those_that_messages_name() {
+        let (radius, length) = (0.1, 0.4);
+        let shapes = [
+            ShapeKind::Plane { normal: Z },
+            ShapeKind::Sphere { radius },
+            ShapeKind::Point,
+            ShapeKind::Capsule { radius, length },
+            ShapeKind::Box { size: [1.0; 3] },
+            ShapeKind::Cylinder { radius, length },
+        ];
+        for (i, a) in shapes.iter().enumerate() {
+            for (j, b) in shapes.iter().enumerate() {
+                let found = elementary(a, b).or_else(|| elementary(b, a)).is_some();
+                let wanted = if i == j { i == 1 || i == 3 } else { i.min(j) <= 2 };
+                assert_eq!(found, wanted, "{} and {}", a.word(), b.word());
+            }
+        }
+        let kind = |a: &ShapeKind, b: &ShapeKind| elementary(a, b).map(|places| places[0].kind);
+        let [lengths, radii] = [[length, 0.0], [radius, 0.3]].map(|x| x.map(Value::Const));
+        let ball = ShapeKind::Sphere { radius: 0.3 };
+        assert_eq!(kind(&shapes[3], &ball), Some(LoopKind::RollingCapsules { axes: [Z; 2], lengths, radii }));
+        let size = [Value::ONE; 3];
+        assert_eq!(kind(&shapes[4], &ShapeKind::Point), Some(LoopKind::RollingBallOnBox { size, radius: Value::ZERO }));
     }
 }

@@ -76,7 +76,7 @@ fn entries(raw: &RawLoop, kind: &LoopSpec, what: &str, findings: &mut Findings) 
         }
     }
     for key in allowed.iter().filter(|key| !present.iter().any(|(given, _)| given == *key)) {
-        if let Some(example) = example(key) {
+        if let Some(example) = example(key, kind) {
             let message = format!("{what}: a {name} loop needs a `{key}`");
             findings.error(raw.name.span, message, format!("add {example}"));
         }
@@ -98,10 +98,13 @@ fn instead(key: &str, allowed: &[&str]) -> String {
 }
 
 /// What to add where a key that has no default is missing.
-fn example(key: &str) -> Option<&'static str> {
+fn example(key: &str, kind: &LoopSpec) -> Option<&'static str> {
     match key {
         "pitch" => Some("`pitch = ..`, metres along the axis per radian (lead per turn / 2 pi)"),
-        "length" => Some("`length = ..`, the distance of the two origins in metres"),
+        "length" if kind.directions.is_empty() => Some("`length = ..`, the distance of the two origins in metres"),
+        "length" => Some("`length = ..`, that of the cylinder in metres"),
+        "lengths" => Some("`lengths = [first, second]`, in metres; 0 makes a ball"),
+        "size" => Some("`size = [x, y, z]`, the lengths of its edges in metres"),
         "radius" => Some("`radius = ..`, in metres"),
         "radii" => Some("`radii = [first, second]`, in metres"),
         "row" => Some("`row = [vx, vy, vz, wx, wy, wz]`, the factors of velocity and angular velocity"),
@@ -124,7 +127,7 @@ fn loop_kind(raw: &RawLoop, kind: &LoopSpec, what: &str, numbers: &mut Numbers) 
             _ => (0..*count).map(|k| raw.list(key).map(|list| &list.value[k])).collect(),
         };
         for (given, slot) in given.into_iter().zip(&mut slots) {
-            *slot = number(given, key, what, numbers);
+            *slot = number(given, key, kind, what, numbers);
         }
     }
     let kind = (kind.make)(LoopNumbers { directions, numbers: values });
@@ -138,9 +141,14 @@ fn loop_kind(raw: &RawLoop, kind: &LoopSpec, what: &str, numbers: &mut Numbers) 
 }
 
 /// One of the numbers under a key.
-fn number(raw: Option<&RawNumber>, key: &str, what: &str, numbers: &mut Numbers) -> Value {
+fn number(raw: Option<&RawNumber>, key: &str, kind: &LoopSpec, what: &str, numbers: &mut Numbers) -> Value {
     match key {
         "pitch" => pitch(raw, what, numbers),
+        "lengths" => not_negative(raw, key, "a length in metres; 0 makes a ball", what, numbers),
+        "size" => positive(raw, key, "lengths in metres, greater than 0", what, numbers),
+        "length" if !kind.directions.is_empty() => {
+            positive(raw, key, "a length in metres, greater than 0", what, numbers)
+        }
         "length" => {
             let help = "the distance in metres, greater than 0; origins that coincide are a `spherical` loop";
             positive(raw, key, help, what, numbers)
@@ -162,6 +170,15 @@ fn positive(raw: Option<&RawNumber>, key: &str, help: &str, what: &str, numbers:
     let value = numbers.or_zero(raw, Quantity::Length, &format!("{what}: `{key}`"));
     if let (Some(at), true) = (raw, numbers.at_default(value) <= 0.0) {
         let message = format!("{what}: `{key}` is not positive{}", by_default(value));
+        numbers.findings.error(at.span, message, format!("write {help}"));
+    }
+    value
+}
+
+fn not_negative(raw: Option<&RawNumber>, key: &str, help: &str, what: &str, numbers: &mut Numbers) -> Value {
+    let value = numbers.or_zero(raw, Quantity::Length, &format!("{what}: `{key}`"));
+    if let (Some(at), true) = (raw, numbers.at_default(value) < 0.0) {
+        let message = format!("{what}: `{key}` is negative{}", by_default(value));
         numbers.findings.error(at.span, message, format!("write {help}"));
     }
     value

@@ -27,4 +27,17 @@ pub struct ImportOptions {
     pub base: Base,
     /// Gravity in ground axes, m/s², instead of that of the file (URDF states none: `[0, 0, -9.81]`).
     pub gravity: Option<[f64; 3]>,
+    /// Whether `limit`s are stops; for URDF only.
+    pub limits: bool,
+    /// A floor that the shapes of the robot can touch; for URDF only. Without one, they touch nothing.
+    pub floor: Option<Floor>,
+}
+
+/// A floor across z of the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Floor {
+    /// Height above the ground's origin, m.
+    pub height: f64,
+    /// Coefficient of friction.
+    pub friction: f64,
 }

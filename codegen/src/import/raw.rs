@@ -385,6 +385,8 @@ pub struct RawModel {
     pub all_pairs: Option<Span>,
     /// Descriptions of the same mechanism after changes of its tree, in file order.
     pub variants: Vec<RawVariant>,
+    /// A shape, by its index, that all other shapes can touch, whatever pairs are asked for.
+    pub floor: Option<usize>,
     /// Whether a body or joint was left out after a finding. Unknown names and bodies without a joint are then not
     /// reported again.
     pub incomplete: bool,
@@ -410,6 +412,7 @@ impl RawModel {
             surface: RawSurface::default(),
             all_pairs: None,
             variants: Vec::new(),
+            floor: None,
             incomplete: false,
             lenient: false,
         }

@@ -100,6 +100,33 @@ pub enum LoopKind {
         /// Radii of the first and the second ball, m.
         radii: [Value; 2],
     },
+    /// A capsule about the second frame's origin rolls on one about the first frame's without slip: cylinders that end in
+    /// half balls, or balls.
+    RollingCapsules {
+        /// Axes of the first and the second capsule, in their own frames.
+        axes: [[f64; 3]; 2],
+        /// Lengths of the straight parts of the first and the second, m; zero for a ball.
+        lengths: [Value; 2],
+        /// Radii of the first and the second, m.
+        radii: [Value; 2],
+    },
+    /// A ball about the second frame's origin rolls without slip on a box about the first frame's, with its edges along
+    /// the axes of that frame.
+    RollingBallOnBox {
+        /// Lengths of the edges along x, y and z, m.
+        size: [Value; 3],
+        /// Radius of the ball, m.
+        radius: Value,
+    },
+    /// A ball about the second frame's origin rolls without slip on a cylinder about the first frame's.
+    RollingBallOnCylinder {
+        /// Axis of the cylinder in the first frame.
+        axis: [f64; 3],
+        /// Length of the cylinder, m.
+        length: Value,
+        /// Radii of the cylinder and the ball, m.
+        radii: [Value; 2],
+    },
     /// The second origin does not move along a direction fixed in the second frame.
     KnifeEdge {
         /// Direction across the edge.
@@ -196,6 +223,10 @@ const fn number(key: &'static str) -> NumberKey {
     NumberKey { key, count: 1 }
 }
 
+const fn both(key: &'static str) -> NumberKey {
+    NumberKey { key, count: 2 }
+}
+
 /// Properties that a loop has in common with the joint of the same kind.
 const fn like(joint: &JointSpec) -> LoopSpec {
     LoopSpec { words: joint.words, ..PLAIN }
@@ -213,7 +244,7 @@ const PLAIN: LoopSpec = LoopSpec {
 use Stands::{InBoth, InFirst, InSecond};
 
 /// Every kind of loop, in the order of the variants of [`LoopKind`].
-pub static LOOPS: [LoopSpec; 17] = [
+pub static LOOPS: [LoopSpec; 20] = [
     LoopSpec {
         directions: &[axis(InBoth)],
         rows: &[M, M, M, RAD, RAD],
@@ -300,9 +331,41 @@ pub static LOOPS: [LoopSpec; 17] = [
     },
     LoopSpec {
         words: Words::new("rolling_balls", &[], &[]),
-        numbers: &[NumberKey { key: "radii", count: 2 }],
+        numbers: &[both("radii")],
         rows: &[M, M, M],
         make: |n| LoopKind::RollingBalls { radii: [n.numbers[0], n.numbers[1]] },
+        ..PLAIN
+    },
+    LoopSpec {
+        words: Words::new("rolling_capsules", &[], &[]),
+        directions: &[axis(InFirst), direction("axis2", InSecond)],
+        numbers: &[both("lengths"), both("radii")],
+        rows: &[M, M, M],
+        make: |n| {
+            let [a, b, c, d, ..] = n.numbers;
+            LoopKind::RollingCapsules { axes: n.directions, lengths: [a, b], radii: [c, d] }
+        },
+        ..PLAIN
+    },
+    LoopSpec {
+        words: Words::new("rolling_ball_on_box", &[], &[]),
+        numbers: &[NumberKey { key: "size", count: 3 }, number("radius")],
+        rows: &[M, M, M],
+        make: |n| {
+            let [x, y, z, radius, ..] = n.numbers;
+            LoopKind::RollingBallOnBox { size: [x, y, z], radius }
+        },
+        ..PLAIN
+    },
+    LoopSpec {
+        words: Words::new("rolling_ball_on_cylinder", &[], &[]),
+        directions: &[axis(InFirst)],
+        numbers: &[number("length"), both("radii")],
+        rows: &[M, M, M],
+        make: |n| {
+            let [length, a, b, ..] = n.numbers;
+            LoopKind::RollingBallOnCylinder { axis: n.directions[0], length, radii: [a, b] }
+        },
         ..PLAIN
     },
     LoopSpec {
@@ -360,8 +423,11 @@ impl LoopKind {
             LoopKind::RollingDisc { .. } => 12,
             LoopKind::RollingBall { .. } => 13,
             LoopKind::RollingBalls { .. } => 14,
-            LoopKind::KnifeEdge { .. } => 15,
-            LoopKind::Pfaffian { .. } => 16,
+            LoopKind::RollingCapsules { .. } => 15,
+            LoopKind::RollingBallOnBox { .. } => 16,
+            LoopKind::RollingBallOnCylinder { .. } => 17,
+            LoopKind::KnifeEdge { .. } => 18,
+            LoopKind::Pfaffian { .. } => 19,
         };
         &LOOPS[index]
     }
@@ -383,12 +449,16 @@ impl LoopKind {
             | LoopKind::PointOnPlane { normal: a }
             | LoopKind::PointOnCylinder { axis: a, .. }
             | LoopKind::RollingBall { normal: a, .. }
+            | LoopKind::RollingBallOnCylinder { axis: a, .. }
             | LoopKind::KnifeEdge { axis: a } => vec![a],
-            LoopKind::Universal { axes: [a, b] } | LoopKind::RollingDisc { normal: a, axis: b, .. } => vec![a, b],
+            LoopKind::Universal { axes: [a, b] }
+            | LoopKind::RollingDisc { normal: a, axis: b, .. }
+            | LoopKind::RollingCapsules { axes: [a, b], .. } => vec![a, b],
             LoopKind::Spherical
             | LoopKind::Fixed
             | LoopKind::Distance { .. }
             | LoopKind::RollingBalls { .. }
+            | LoopKind::RollingBallOnBox { .. }
             | LoopKind::Pfaffian { .. } => Vec::new(),
         }
     }
@@ -402,6 +472,9 @@ impl LoopKind {
             | LoopKind::RollingDisc { radius: x, .. }
             | LoopKind::RollingBall { radius: x, .. } => vec![x],
             LoopKind::RollingBalls { radii } => radii.iter_mut().collect(),
+            LoopKind::RollingCapsules { lengths, radii, .. } => lengths.iter_mut().chain(radii).collect(),
+            LoopKind::RollingBallOnBox { size, radius } => size.iter_mut().chain([radius]).collect(),
+            LoopKind::RollingBallOnCylinder { length, radii, .. } => [length].into_iter().chain(radii).collect(),
             LoopKind::Pfaffian { row } => row.iter_mut().collect(),
             _ => Vec::new(),
         }
@@ -425,6 +498,9 @@ impl LoopKind {
             LoopKind::RollingDisc { radius, .. } => Closure::RollingDisc { radius },
             LoopKind::RollingBall { radius, .. } => Closure::RollingBall { radius },
             LoopKind::RollingBalls { radii } => Closure::RollingBalls { radii },
+            LoopKind::RollingCapsules { lengths, radii, .. } => Closure::RollingCapsules { lengths, radii },
+            LoopKind::RollingBallOnBox { size, radius } => Closure::RollingBallOnBox { size, radius },
+            LoopKind::RollingBallOnCylinder { length, radii, .. } => Closure::RollingBallOnCylinder { length, radii },
             LoopKind::KnifeEdge { .. } => Closure::KnifeEdge,
             LoopKind::Pfaffian { row } => Closure::Pfaffian { row },
         }

@@ -27,7 +27,7 @@ fn parts(model: &Model, name: &str) -> (LoopKind, Mount, Mount) {
 fn constraints_come_in_file_order() {
     let names: Vec<String> = clean(ALL).constraints.into_iter().map(|c| c.name).collect();
     let all =
-        "close guide gears tubes screw shaft shaft_2 table socket weld rod rail floor pipe disc marble marbles skate odd rack";
+        "close guide gears tubes screw shaft shaft_2 table socket weld rod rail floor pipe disc marble marbles pills die drum skate odd rack";
     assert_eq!(names, all.split(' ').map(|n| n.replace("shaft_2", "shaft 2")).collect::<Vec<_>>());
 }
 
@@ -52,6 +52,9 @@ fn every_type_is_read() {
         ("disc", LoopKind::RollingDisc { normal: [0.0, 0.0, 3.0], axis: Y, radius: C(0.3) }),
         ("marble", LoopKind::RollingBall { normal: Z, radius: C(0.1) }),
         ("marbles", LoopKind::RollingBalls { radii: [C(0.1), lead] }),
+        ("pills", LoopKind::RollingCapsules { axes: [X, Z], lengths: [C(0.3), C(0.0)], radii: [C(0.1), lead] }),
+        ("die", LoopKind::RollingBallOnBox { size: [C(0.1), C(0.2), lead], radius: C(0.05) }),
+        ("drum", LoopKind::RollingBallOnCylinder { axis: Y, length: C(0.4), radii: [C(0.1), C(0.2)] }),
         ("skate", LoopKind::KnifeEdge { axis: Y }),
         ("odd", LoopKind::Pfaffian { row: [C(1.0), C(0.0), C(0.0), C(0.0), C(0.0), lead] }),
     ] {

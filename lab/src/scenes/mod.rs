@@ -127,7 +127,7 @@ impl Entry {
             Source::Undamped(file, text, base) => (file.to_string(), Cow::Borrowed(text), base),
             Source::Made(make) => (format!("{}.toml", self.name), Cow::Owned(make(self.name)), Base::Fixed),
         };
-        let mut model = read::model(&file, &text, &ImportOptions { base, gravity: None })
+        let mut model = read::model(&file, &text, &ImportOptions { base, ..ImportOptions::default() })
             .unwrap_or_else(|findings| panic!("scene `{}`: {findings}", self.name))
             .model;
         if matches!(self.model, Source::Undamped(..)) {

@@ -4,6 +4,7 @@
 //! `A` to components in `B`, `d` goes from the origin of `A` to that of `B`. A row is a wrench `E` on `B` with `Eᵀ
 //! Ω_rel = b`; where what is left free is a joint that moves with `B`, it is constant.
 
+use super::touch::Touch;
 use crate::spatial::{add3, cross, dot3, scale3, Force, Motion, Vec3};
 use crate::tree::Closure;
 use crate::workspace::Relative;
@@ -19,26 +20,6 @@ fn unit<S: Scalar>(k: usize) -> Force<S> {
 /// A force along `n` at the point `r`.
 fn at_point<S: Scalar>(n: Vec3<S>, r: Vec3<S>) -> Force<S> {
     Force { lin: n, ang: cross(r, n) }
-}
-
-/// Contact of two bodies that are balls about points, or what such balls cover when the points pass along segments.
-struct Touch<S> {
-    /// Distance of the surfaces, m.
-    gap: S,
-    /// Normal of both surfaces, towards the second body.
-    normal: Vec3<S>,
-    /// The contact point on the second body, from the origin of `B`, m.
-    at: Vec3<S>,
-}
-
-impl<S: Scalar> Touch<S> {
-    /// The contact of a ball about `middle`, from the origin of `B`, with another that is `apart` before it.
-    fn new(middle: Vec3<S>, apart: Vec3<S>, radii: &[S; 2]) -> Touch<S> {
-        // Points that coincide have no direction: the addend, far below the rounding of any other distance, gives zero.
-        let distance = (dot3(apart, apart) + S::constant(1e-36)).sqrt();
-        let normal = scale3(S::one() / distance, apart);
-        Touch { gap: distance - (radii[0] + radii[1]), normal, at: add3(middle, scale3(-radii[1], normal)) }
-    }
 }
 
 /// Two directions that form a right-handed triple of unit vectors with `n` in front: those of a constant triple in `A`
@@ -58,8 +39,14 @@ fn tangents<S: Scalar>(at: &Relative<S>, n: Vec3<S>) -> [Vec3<S>; 2] {
 
 impl<S: Scalar> Relative<S> {
     /// Axis `k` of `A`.
-    fn axis(&self, k: usize) -> Vec3<S> {
+    pub(super) fn axis(&self, k: usize) -> Vec3<S> {
         [self.turn[0][k], self.turn[1][k], self.turn[2][k]]
+    }
+
+    /// `d` without its part along z of `A`.
+    pub(super) fn across(&self) -> Vec3<S> {
+        let z = self.axis(2);
+        add3(self.d, scale3(-dot3(z, self.d), z))
     }
 
     /// Motion of `A` at the origin of `B`, in its components.
@@ -104,7 +91,10 @@ impl<S: Copy> Closure<S> {
             | Closure::Spherical
             | Closure::RollingDisc { .. }
             | Closure::RollingBall { .. }
-            | Closure::RollingBalls { .. } => 3,
+            | Closure::RollingBalls { .. }
+            | Closure::RollingCapsules { .. }
+            | Closure::RollingBallOnBox { .. }
+            | Closure::RollingBallOnCylinder { .. } => 3,
             Closure::PointOnLine => 2,
             Closure::Distance { .. }
             | Closure::PointOnPlane
@@ -117,10 +107,25 @@ impl<S: Copy> Closure<S> {
     /// Whether row `k` is the derivative of a condition on positions.
     pub fn holonomic(&self, k: usize) -> bool {
         match self {
-            Closure::RollingDisc { .. } | Closure::RollingBall { .. } | Closure::RollingBalls { .. } => k == 0,
             Closure::KnifeEdge | Closure::Pfaffian { .. } => false,
-            _ => true,
+            _ => k == 0 || !self.rolls(),
         }
+    }
+
+    /// Whether two surfaces roll on each other without slip: the first row is their distance, the others their slip.
+    pub fn rolls(&self) -> bool {
+        use Closure::{
+            RollingBall, RollingBallOnBox, RollingBallOnCylinder, RollingBalls, RollingCapsules, RollingDisc,
+        };
+        matches!(
+            self,
+            RollingDisc { .. }
+                | RollingBall { .. }
+                | RollingBalls { .. }
+                | RollingCapsules { .. }
+                | RollingBallOnBox { .. }
+                | RollingBallOnCylinder { .. }
+        )
     }
 
     /// Whether the residual of row `k` is an angle (rad); those of the other rows are lengths (m).
@@ -145,17 +150,15 @@ impl<S: Copy> Closure<S> {
 impl<S: Scalar> Closure<S> {
     /// Whether the rows are constant.
     pub(super) fn constant(&self) -> bool {
-        !matches!(
-            self,
-            Closure::Universal
-                | Closure::Distance { .. }
-                | Closure::PointOnLine
-                | Closure::PointOnPlane
-                | Closure::PointOnCylinder { .. }
-                | Closure::RollingDisc { .. }
-                | Closure::RollingBall { .. }
-                | Closure::RollingBalls { .. }
-        )
+        !self.rolls()
+            && !matches!(
+                self,
+                Closure::Universal
+                    | Closure::Distance { .. }
+                    | Closure::PointOnLine
+                    | Closure::PointOnPlane
+                    | Closure::PointOnCylinder { .. }
+            )
     }
 
     /// Rows that are constants, by components.
@@ -191,19 +194,12 @@ impl<S: Scalar> Closure<S> {
             Closure::PointOnLine => (rows[0], rows[1]) = (force(at.axis(0)), force(at.axis(1))),
             Closure::PointOnPlane => rows[0] = force(at.axis(2)),
             Closure::PointOnCylinder { radius } => {
-                rows[0] = force(scale3(S::one() / *radius, self.across(at)));
+                rows[0] = force(scale3(S::one() / *radius, at.across()));
             }
             Closure::RollingDisc { .. } | Closure::RollingBall { .. } => {
                 let contact = self.contact(at);
                 for (row, k) in rows.iter_mut().zip([2, 0, 1]) {
                     *row = at_point(at.axis(k), contact);
-                }
-            }
-            Closure::RollingBalls { .. } => {
-                let touch = self.touch(at);
-                let tangents = tangents(at, touch.normal);
-                for (row, t) in rows.iter_mut().zip([touch.normal, tangents[0], tangents[1]]) {
-                    *row = at_point(t, touch.at);
                 }
             }
             Closure::KnifeEdge => rows[0] = unit(2),
@@ -212,13 +208,13 @@ impl<S: Scalar> Closure<S> {
             }
             _ => {}
         }
+        if let Some(touch) = self.touch(at) {
+            let tangents = tangents(at, touch.normal);
+            for (row, t) in rows.iter_mut().zip([touch.normal, tangents[0], tangents[1]]) {
+                *row = at_point(t, touch.at);
+            }
+        }
         rows
-    }
-
-    /// `d` without its part along z of `A`.
-    fn across(&self, at: &Relative<S>) -> Vec3<S> {
-        let z = at.axis(2);
-        add3(at.d, scale3(-dot3(z, at.d), z))
     }
 
     /// Contact point of the rolling body and the plane, from the origin of `B`, m.
@@ -235,11 +231,14 @@ impl<S: Scalar> Closure<S> {
         }
     }
 
-    /// Contact of two rounded bodies.
-    fn touch(&self, at: &Relative<S>) -> Touch<S> {
+    /// Contact of two bodies neither of which is a plane; `None` for other kinds.
+    fn touch(&self, at: &Relative<S>) -> Option<Touch<S>> {
         match self {
-            Closure::RollingBalls { radii } => Touch::new([S::zero(); 3], at.d, radii),
-            _ => Touch::new([S::zero(); 3], at.d, &[S::zero(); 2]),
+            Closure::RollingBalls { radii } => Some(Touch::balls(at, radii)),
+            Closure::RollingCapsules { lengths, radii } => Some(Touch::capsules(at, lengths, radii)),
+            Closure::RollingBallOnBox { size, radius } => Some(Touch::ball_on_box(at, size, *radius)),
+            Closure::RollingBallOnCylinder { length, radii } => Some(Touch::ball_on_cylinder(at, *length, radii)),
+            _ => None,
         }
     }
 
@@ -271,12 +270,14 @@ impl<S: Scalar> Closure<S> {
             Closure::PointOnLine => (out[0], out[1]) = (dot3(x, d), dot3(at.axis(1), d)),
             Closure::PointOnPlane => out[0] = dot3(z, d),
             Closure::PointOnCylinder { radius } => {
-                let across = self.across(at);
+                let across = at.across();
                 out[0] = half * (dot3(across, across) / *radius - *radius);
             }
             Closure::RollingDisc { .. } | Closure::RollingBall { .. } => out[0] = dot3(z, add3(d, self.contact(at))),
-            Closure::RollingBalls { .. } => out[0] = self.touch(at).gap,
             _ => {}
+        }
+        if let Some(touch) = self.touch(at) {
+            out[0] = touch.gap;
         }
         out
     }

@@ -33,6 +33,7 @@ mod rates;
 mod regressor;
 mod solve;
 mod steps;
+mod touch;
 
 pub use derivatives::{Derivatives, MomentumDerivatives, ParameterDerivatives};
 pub use kinematics::FrameState;

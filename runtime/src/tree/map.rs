@@ -137,6 +137,15 @@ impl<S: Copy> Closure<S> {
             Closure::RollingDisc { radius } => Closure::RollingDisc { radius: of(radius) },
             Closure::RollingBall { radius } => Closure::RollingBall { radius: of(radius) },
             Closure::RollingBalls { radii } => Closure::RollingBalls { radii: radii.map(of) },
+            Closure::RollingCapsules { lengths, radii } => {
+                Closure::RollingCapsules { lengths: lengths.map(&mut of), radii: radii.map(of) }
+            }
+            Closure::RollingBallOnBox { size, radius } => {
+                Closure::RollingBallOnBox { size: size.map(&mut of), radius: of(radius) }
+            }
+            Closure::RollingBallOnCylinder { length, radii } => {
+                Closure::RollingBallOnCylinder { length: of(length), radii: radii.map(of) }
+            }
             Closure::KnifeEdge => Closure::KnifeEdge,
             Closure::Pfaffian { row } => Closure::Pfaffian { row: row.map(of) },
         }

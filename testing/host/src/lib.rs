@@ -10,7 +10,7 @@ use mbd_codegen::{generate, Options, Output};
 pub fn code(path: &str, text: &str) -> String {
     let floating = ["solo12", "g1"].iter().any(|name| path.contains(name));
     let base = if floating { Base::Floating } else { Base::Fixed };
-    let model = match read::model(path, text, &ImportOptions { base, gravity: None }) {
+    let model = match read::model(path, text, &ImportOptions { base, ..ImportOptions::default() }) {
         Ok(read) => read.model,
         Err(findings) => return findings.to_string(),
     };

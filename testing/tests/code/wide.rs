@@ -27,7 +27,7 @@ pub const MODELS: [(&str, Base); 11] = [
 pub fn model(file: &str, base: Base) -> Model {
     let path = format!("{}/../models/{file}", env!("CARGO_MANIFEST_DIR"));
     let text = std::fs::read_to_string(path).expect("the model");
-    read::model(file, &text, &ImportOptions { base, gravity: None })
+    read::model(file, &text, &ImportOptions { base, ..ImportOptions::default() })
         .unwrap_or_else(|findings| panic!("{findings}"))
         .model
 }

@@ -1,8 +1,10 @@
 //! Motions with contacts against their known answers.
 
 mod answers;
+mod edges;
 mod known;
 mod round;
 mod scene;
+mod solid;
 mod stepping;
 mod walker;

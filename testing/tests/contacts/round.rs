@@ -9,10 +9,10 @@ use mbd_runtime::spatial::{add3, dot3, scale3, Vec3};
 use super::answers::{elliptic, shipped};
 use super::scene::{model, Scene};
 
-const G: f64 = 9.81;
+pub(super) const G: f64 = 9.81;
 
 /// A body on slides along x, y and z, with shapes and contacts.
-fn flying(rest: &str) -> Model {
+pub(super) fn flying(rest: &str) -> Model {
     let slide = |name: &str, parent: &str, child: &str, axis: &str| {
         format!(
             r#"
@@ -82,7 +82,7 @@ fn newtons_cradle_divides_its_speed_by_the_order_of_the_impacts() {
 
 /// What is dropped at rest from `start` and bounces without friction and loss off a surface whose normal where it meets it
 /// at `place` is `normal` is mirrored there.
-fn mirrored(rest: &str, start: Vec3<f64>, place: Vec3<f64>, normal: Vec3<f64>) {
+pub(super) fn mirrored(rest: &str, start: Vec3<f64>, place: Vec3<f64>, normal: Vec3<f64>) {
     let mut scene = Scene::new(flying(rest), &start, &[0.0; 3]);
     let time = (2.0 * (start[2] - place[2]) / G).sqrt();
     let after = time + 0.01;
@@ -113,7 +113,7 @@ type = "sphere"
 radius = 0.2
 "#;
 
-fn contact(names: [&str; 2], friction: f64, restitution: f64) -> String {
+pub(super) fn contact(names: [&str; 2], friction: f64, restitution: f64) -> String {
     let [a, b] = names;
     format!(
         "[[contact]]\nname = \"c\"\nbetween = [\"{a}\", \"{b}\"]\nfriction = {friction}\nrestitution = {restitution}\n"

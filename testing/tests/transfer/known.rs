@@ -270,8 +270,9 @@ between = ["eye", "end"]
     let state = open.transfer(&q, &v, &mut hooked).expect("a closed loop");
     assert_eq!(state.q, q);
     assert!(state.lost() > 0.0);
-    let mut rates = vec![0.0; 3];
-    hooked.interpreter.row_velocities(&state.q, &state.v, &mut rates);
+    // Three rows on four joints.
+    let (mut gaps, mut rates, mut entries) = (vec![0.0; 3], vec![0.0; 3], vec![0.0; 3 * 4]);
+    hooked.interpreter.gaps(&state.q, &state.v, &mut gaps, &mut rates, &mut entries);
     near("velocity of the hook", &rates, &[0.0; 3], 1e-12);
     // Of all velocities that the hook allows the nearest: the change does no work on them.
     let mut p = vec![0.0; 4];

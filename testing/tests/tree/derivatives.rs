@@ -260,7 +260,7 @@ fn eliminations_do_not_matter() {
     for file in ["ur5.urdf", "chain10_planar.toml"] {
         let text =
             std::fs::read_to_string(format!("{}/../models/{file}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
-        let model = read::model(file, &text, &ImportOptions { base: Base::Fixed, gravity: None })
+        let model = read::model(file, &text, &ImportOptions { base: Base::Fixed, ..ImportOptions::default() })
             .unwrap_or_else(|findings| panic!("{findings}"))
             .model;
         let fastest = search::plan(&model, PlanOptions::default());

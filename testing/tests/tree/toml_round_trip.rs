@@ -73,7 +73,7 @@ fn loop_kind(model: &Model, rng: &mut Rng) -> LoopKind {
     let axis = rng.pick(&[[0.0, 0.0, 1.0], axis]);
     let square = rng.pick(&[[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0.0, 0.0, 1.0], [3.0, -1.0, 0.0]]]);
     let size = value(model, rng, 0.1, 1.0);
-    match rng.below(17) {
+    match rng.below(20) {
         0 => LoopKind::Revolute { axis },
         1 => LoopKind::Prismatic { axis },
         2 => LoopKind::Cylindrical { axis },
@@ -89,7 +89,10 @@ fn loop_kind(model: &Model, rng: &mut Rng) -> LoopKind {
         12 => LoopKind::RollingDisc { normal, axis, radius: size },
         13 => LoopKind::RollingBall { normal, radius: size },
         14 => LoopKind::RollingBalls { radii: [size, value(model, rng, 0.1, 1.0)] },
-        15 => LoopKind::KnifeEdge { axis },
+        15 => LoopKind::RollingCapsules { axes: [axis, normal], lengths: [Value::ZERO, size], radii: [size; 2] },
+        16 => LoopKind::RollingBallOnBox { size: [size, value(model, rng, 0.1, 1.0), Value::ONE], radius: size },
+        17 => LoopKind::RollingBallOnCylinder { axis, length: size, radii: [Value::ONE, size] },
+        18 => LoopKind::KnifeEdge { axis },
         _ => LoopKind::Pfaffian { row: [Value::ONE, Value::ZERO, size, Value::ZERO, Value::ZERO, size] },
     }
 }

@@ -35,7 +35,7 @@ fn robot(lib: &mut String, name: &str, base: &str, path: &str) {
     println!("cargo:rerun-if-changed={path}");
     let text = std::fs::read_to_string(path).expect("the model");
     let base = if base == "floating" { Base::Floating } else { Base::Fixed };
-    let mut model = read::model(path, &text, &ImportOptions { base, gravity: None }).unwrap_or_else(|findings| panic!("{findings}")).model;
+    let mut model = read::model(path, &text, &ImportOptions { base, ..ImportOptions::default() }).unwrap_or_else(|findings| panic!("{findings}")).model;
     // Pinocchio's forward dynamics has no dampers.
     for joint in &mut model.joints {
         joint.damping.fill(mbd_codegen::model::Value::Const(0.0));

@@ -28,6 +28,10 @@ pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings) -> Opt
         let help = "leave the option out; in the file the joints to `ground` say how the model is attached";
         findings.error(Span::FILE, "a TOML model states its own base", help);
     }
+    if options.limits || options.floor.is_some() {
+        let help = "leave these options out; in the file, `limits`, `[[shape]]` and `[[contact]]` describe them";
+        findings.error(Span::FILE, "a TOML model states its own limits and contacts", help);
+    }
     let mut raw = document(text, findings)?;
     if let Some(g) = options.gravity {
         raw.gravity = Some(override_gravity(g, findings));

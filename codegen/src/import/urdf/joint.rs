@@ -3,33 +3,35 @@
 use super::link::read_origin;
 use super::xml::{place, Reader};
 use crate::diag::Severity;
-use crate::import::raw::{RawFreedoms, RawJoint, RawMimic, RawNumber, RawValue};
+use crate::import::raw::{RawFreedoms, RawJoint, RawLimits, RawMimic, RawNumber, RawValue};
 use crate::import::source::{Span, Spanned};
 use crate::import::words::{did_you_mean, quote};
 use crate::model::{JointSpec, JOINTS};
 use roxmltree::Node;
 
 /// Elements of a `joint` that have no effect on its free motion.
-const IGNORED: [(&str, &str); 3] = [
-    ("limit", "`limit` is not used: joints move without stops, torques without bounds"),
-    ("safety_controller", "`safety_controller` is not used"),
-    ("calibration", "`calibration` is not used"),
-];
+const IGNORED: [(&str, &str); 2] =
+    [("safety_controller", "`safety_controller` is not used"), ("calibration", "`calibration` is not used")];
 
-/// Reads a `joint`. Without a name, a parent or a child it is reported and left out.
-pub(super) fn read(reader: &mut Reader, node: Node) -> Option<RawJoint> {
+/// What is said of limits that are not asked for.
+const UNUSED_LIMIT: &str =
+    "`limit` is not used: joints move without stops (`--limits` of `mbd simulate` reads them), torques without bounds";
+
+/// Reads a `joint`, with its `limits` as stops where they are asked for. Without a name, a parent or a child it is reported and left out.
+pub(super) fn read(reader: &mut Reader, node: Node, limits: bool) -> Option<RawJoint> {
     reader.attributes(node, &["name", "type"]);
     let name = reader.required(node, "name", "");
     let whose = name.as_ref().map_or(String::new(), |n| format!("joint {}: ", quote(n.value)));
     let kind = read_kind(reader, node, &whose);
-    let used = ["origin", "parent", "child", "axis", "dynamics", "mimic"];
-    let [origin, parent, child, axis, dynamics, mimic] = reader.single_children(node, used, &IGNORED);
+    let used = ["origin", "parent", "child", "axis", "dynamics", "mimic", "limit"];
+    let [origin, parent, child, axis, dynamics, mimic, limit] = reader.single_children(node, used, &IGNORED);
     let parent = read_end(reader, node, parent, "parent", &whose);
     let child = read_end(reader, node, child, "child", &whose);
     let placement = origin.map(|o| read_origin(reader, o, &whose)).unwrap_or_default();
     let axis = read_axis(reader, node, axis, kind.as_ref().map(|k| k.value), &whose);
     let damping = dynamics.and_then(|d| read_dynamics(reader, d, kind.as_ref().map(|k| k.value), &whose));
     let mimic = mimic.and_then(|m| read_mimic(reader, m, kind.as_ref().map(|k| k.value), &whose));
+    let limits = limit.and_then(|l| read_limit(reader, l, kind.as_ref().map(|k| k.value), limits, &whose));
     let name = name?;
     let unbounded = node.attribute("type") == Some("continuous");
     let mut joint = RawJoint::new(Spanned::new(name.value.to_string(), name.span), kind, Some(child?));
@@ -38,6 +40,8 @@ pub(super) fn read(reader: &mut Reader, node: Node) -> Option<RawJoint> {
     joint.placement = placement;
     joint.axis = axis;
     joint.damping = damping;
+    // The leader's stops are those of both.
+    joint.limits = limits.filter(|_| !unbounded && mimic.is_none());
     joint.mimic = mimic;
     Some(joint)
 }
@@ -127,6 +131,39 @@ fn read_dynamics(reader: &mut Reader, node: Node, kind: Option<&JointSpec>, whos
         return None;
     }
     is_not_zero(&damping).then_some(RawFreedoms::All(damping))
+}
+
+/// The stops of a joint, where they are asked for.
+fn read_limit(
+    reader: &mut Reader,
+    node: Node,
+    kind: Option<&JointSpec>,
+    asked: bool,
+    whose: &str,
+) -> Option<RawLimits> {
+    if !asked {
+        reader.tally.notice(place(node), UNUSED_LIMIT);
+        return None;
+    }
+    reader.tally.notice(place(node), "torques and speeds have no bounds: of `limit`, `lower` and `upper` are used");
+    reader.leaf(node, &["lower", "upper", "effort", "velocity"]);
+    let (lower, upper) = (reader.number(node, "lower", whose), reader.number(node, "upper", whose));
+    // A joint of several freedoms or none has no stops, and one without these numbers is not meant to have any.
+    if kind.is_none_or(|spec| spec.nv() != 1) || (lower.is_none() && upper.is_none()) {
+        return None;
+    }
+    let range = node.range();
+    let span = Span::new(range.start, range.end);
+    let zero = || Spanned::new(RawValue::Const(0.0), place(node));
+    let (lower, upper) = (lower.unwrap_or_else(zero), upper.unwrap_or_else(zero));
+    if let (RawValue::Const(a), RawValue::Const(b)) = (&lower.value, &upper.value) {
+        if a >= b {
+            let message = format!("{whose}`limit` from {a} to {b} is not used");
+            reader.findings.warning(place(node), message, "write a `lower` that is less than `upper`");
+            return None;
+        }
+    }
+    Some(RawLimits { span, lower: Some(lower), upper: Some(upper) })
 }
 
 fn is_not_zero(number: &RawNumber) -> bool {

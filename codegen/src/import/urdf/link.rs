@@ -6,15 +6,16 @@ use crate::import::source::{Span, Spanned};
 use crate::import::words::quote;
 use roxmltree::Node;
 
-/// Message for elements that only concern appearance and contact.
-pub(super) const SHAPES: &str = "shapes and colours (`visual`, `collision`, `material`) are not used";
+/// Message for elements that only concern appearance.
+pub(super) const LOOKS: &str = "shapes and colours to look at (`visual`, `material`) are not used";
 
 /// Elements of a `link` that have no effect on its motion.
 const IGNORED: [(&str, &str); 5] = [
-    ("visual", SHAPES),
-    ("collision", SHAPES),
-    ("collision_checking", SHAPES),
-    ("self_filter", SHAPES),
+    ("visual", LOOKS),
+    // Read beside the link.
+    ("collision", ""),
+    ("collision_checking", "`collision_checking` is not used"),
+    ("self_filter", "`self_filter` is not used"),
     ("contact", "`contact` is not used"),
 ];
 

@@ -1,22 +1,24 @@
 //! The URDF reader: `robot` files of links and joints, as robot makers publish them.
 //!
 //! Every element and attribute is used, named in a finding, or an error. Elements without effect on the free motion
-//! (shapes, limits, extensions of simulators) are counted, with one notice for each kind; unknown elements are
-//! warnings. Macros, entities and other formats are errors.
+//! (what is there to look at, limits, extensions of simulators) are counted, with one notice for each kind; unknown
+//! elements are warnings. Macros, entities and other formats are errors. Shapes are read, but act only where the options
+//! ask for a floor; limits are stops where the options ask for them.
 
 mod joint;
 mod link;
+mod shape;
 mod unused;
 mod xml;
 
 #[cfg(test)]
 mod tests;
 
-use super::raw::{RawBody, RawGravity, RawJoint, RawModel, RawValue};
+use super::raw::{RawBody, RawGravity, RawJoint, RawModel, RawNumber, RawPlacement, RawShape, RawValue};
 use super::source::{Findings, Span, Spanned};
 use super::words::{list, quote};
-use super::{Base, ImportOptions};
-use crate::model::{FIXED, FLOATING, PLANAR};
+use super::{Base, Floor, ImportOptions};
+use crate::model::{FIXED, FLOATING, PLANAR, SHAPES};
 use roxmltree::{Document, Node};
 use std::collections::HashSet;
 use unused::Tally;
@@ -24,7 +26,7 @@ use xml::{place, shown, syntax_error, Reader};
 
 /// Elements of a `robot` that have no effect on its motion.
 const IGNORED: [(&str, &str); 6] = [
-    ("material", link::SHAPES),
+    ("material", link::LOOKS),
     ("gazebo", "`gazebo` is not used, even where it speaks of physics"),
     ("transmission", "`transmission` is not used: motors and gears have no inertia"),
     ("ros2_control", "`ros2_control` is not used"),
@@ -72,24 +74,55 @@ fn read_robot(reader: &mut Reader, node: Node, options: &ImportOptions) -> Optio
             None
         }
     };
+    let mut taken = shape::Taken::default();
+    if let Some(floor) = options.floor {
+        raw.shapes.push(plane(taken.free("floor"), floor));
+        raw.floor = Some(0);
+        raw.surface.friction = Some(number(floor.friction));
+    }
     for child in reader.children(node, &["link", "joint"], &IGNORED) {
         if child.tag_name().name() == "link" {
-            push_or_note(&mut raw.bodies, link::read(reader, child), &mut raw.incomplete);
+            let body = link::read(reader, child);
+            if let Some(body) = &body {
+                shape::all(reader, child, &body.name, options.floor.is_some(), &mut taken, &mut raw.shapes);
+            }
+            push_or_note(&mut raw.bodies, body, &mut raw.incomplete);
         } else {
-            push_or_note(&mut raw.joints, joint::read(reader, child), &mut raw.incomplete);
+            push_or_note(&mut raw.joints, joint::read(reader, child, options.limits), &mut raw.incomplete);
         }
     }
     if raw.bodies.is_empty() && !raw.incomplete {
         reader.findings.error(place(node), "a robot without links", "give at least one `link`");
         return None;
     }
+    if options.floor.is_some() && raw.shapes.len() == 1 {
+        let help = "give its links `collision`s with a box, sphere, cylinder or capsule; or leave the floor out";
+        reader.findings.warning(place(node), "nothing touches the floor: no shape of this robot was read", help);
+    }
     rename_ground(reader, &mut raw);
     add_base(reader, &mut raw, options.base);
-    raw.gravity = options.gravity.map(|g| {
-        let number = |x| Spanned::new(RawValue::Const(x), Span::FILE);
-        RawGravity::Constant(Spanned::new(g.map(number), Span::FILE))
-    });
+    raw.gravity = options.gravity.map(|g| RawGravity::Constant(Spanned::new(g.map(number), Span::FILE)));
     Some(raw)
+}
+
+/// A number of the options.
+fn number(x: f64) -> RawNumber {
+    Spanned::new(RawValue::Const(x), Span::FILE)
+}
+
+/// The plane across z of the ground.
+fn plane(name: String, floor: Floor) -> RawShape {
+    let xyz = Spanned::new([0.0, 0.0, floor.height].map(number), Span::FILE);
+    RawShape {
+        name: Spanned::new(name, Span::FILE),
+        body: None,
+        kind: SHAPES.iter().find(|spec| spec.word() == "plane").map(|spec| Spanned::new(spec, Span::FILE)),
+        placement: RawPlacement { xyz: Some(xyz), rotation: None },
+        radius: None,
+        length: None,
+        size: None,
+        normal: None,
+    }
 }
 
 fn push_or_note<T>(list: &mut Vec<T>, item: Option<T>, incomplete: &mut bool) {
@@ -107,7 +140,8 @@ fn rename_ground(reader: &mut Reader, raw: &mut RawModel) {
     }
     let new = free_name("ground_link", &taken);
     let ends = raw.joints.iter_mut().flat_map(|j| j.parent.iter_mut().chain(&mut j.child));
-    for end in ends.filter(|end| end.value == "ground") {
+    let carriers = raw.shapes.iter_mut().flat_map(|s| &mut s.body);
+    for end in ends.chain(carriers).filter(|end| end.value == "ground") {
         end.value.clone_from(&new);
     }
     for body in raw.bodies.iter_mut().filter(|b| b.name.value == "ground") {

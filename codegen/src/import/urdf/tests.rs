@@ -1,6 +1,6 @@
 use crate::diag::{Diagnostics, Severity};
-use crate::import::{Base, ImportOptions};
-use crate::model::{Gravity, JointKind, JointMotion, Model, Rotation, Value};
+use crate::import::{Base, Floor, ImportOptions};
+use crate::model::{Gravity, JointKind, JointMotion, Model, Rotation, ShapeKind, Value};
 use crate::read::load;
 use std::fmt::Write;
 
@@ -155,7 +155,7 @@ fn a_link_called_ground_is_renamed_and_stays_connected() {
 #[test]
 fn gravity_comes_from_the_options() {
     let text = format!("<robot name='r'>{}</robot>", link("a"));
-    let options = ImportOptions { gravity: Some([0.0, -1.62, 0.0]), base: Base::Floating };
+    let options = ImportOptions { gravity: Some([0.0, -1.62, 0.0]), base: Base::Floating, ..ImportOptions::default() };
     let (m, _) = load("r.urdf", &text, &options);
     assert_eq!(m.map(|m| m.gravity), Some(Gravity::Constant([0.0, -1.62, 0.0].map(Value::Const))));
 }
@@ -215,4 +215,100 @@ fn no_bytes_make_it_panic() {
     write!(long, "{0}='1' value{1}={1}'ä'/></inertial></link></robot>", "ä".repeat(40_000), " ".repeat(300)).unwrap();
     let (m, findings) = import(&long, Base::Floating);
     assert!(m.is_none() && findings.0.len() >= 3, "{findings}");
+}
+
+/// A robot with every kind of shape, a joint with limits, and one that follows it.
+const TOUCHING: &str = r#"<robot name='r'>
+  <link name='base'>
+    <collision><geometry><box size='1 2 3'/></geometry></collision>
+    <collision name=' '><origin xyz='1 2 3' rpy='0.1 0.2 0.3'/><geometry><sphere radius='0.5'/></geometry></collision>
+    <collision name='foot'><geometry><cylinder radius='0.1' length='0.4'/></geometry></collision>
+    <inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>
+  </link>
+  <link name='ground'>
+    <collision name='foot'><geometry><capsule radius='0.2' length='0.3'/></geometry></collision>
+    <collision><geometry><mesh filename='a.stl'/></geometry></collision>
+    <inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>
+  </link>
+  <link name='tip'>
+    <inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>
+  </link>
+  <joint name='j' type='revolute'><parent link='base'/><child link='ground'/><limit lower='-1' upper='2' effort='3'/></joint>
+  <joint name='k' type='prismatic'><parent link='ground'/><child link='tip'/><mimic joint='j'/><limit upper='1'/></joint>
+</robot>"#;
+
+/// Shapes act, and limits are stops, only where the options ask for it: the rest of the model is the same.
+#[test]
+fn shapes_are_read_and_touch_a_floor_that_is_asked_for() {
+    let (free, findings) = model(TOUCHING, Base::Floating);
+    let names: Vec<&str> = free.shapes.iter().map(|s| s.name.as_str()).collect();
+    assert_eq!(names, ["base", "base_shape_2", "foot", "foot_shape_2"]);
+    let [radius, length] = [0.2, 0.3];
+    assert_eq!(free.shapes[0].kind, ShapeKind::Box { size: [1.0, 2.0, 3.0] });
+    assert_eq!(free.shapes[1].kind, ShapeKind::Sphere { radius: 0.5 });
+    assert_eq!(consts(free.shapes[1].mount.placement.xyz), [1.0, 2.0, 3.0]);
+    assert_eq!(free.shapes[1].mount.placement.rotation, Rotation::Rpy([0.1, 0.2, 0.3].map(Value::Const)));
+    assert_eq!(free.shapes[2].kind, ShapeKind::Cylinder { radius: 0.1, length: 0.4 });
+    // The link `ground` is called otherwise here; its shape stays on it.
+    assert_eq!((free.shapes[3].kind, free.shapes[3].mount.body), (ShapeKind::Capsule { radius, length }, Some(1)));
+    assert!(free.contacts.is_empty());
+    assert!(findings.contains("touches nothing unless a floor is asked for"), "{findings}");
+    assert!(findings.contains("`mesh` of a `collision` is not used"), "{findings}");
+    assert!(findings.contains("`limit` is not used"), "{findings}");
+    let floor = Some(Floor { height: -0.5, friction: 0.7 });
+    let options = ImportOptions { base: Base::Floating, limits: true, floor, ..ImportOptions::default() };
+    let (touching, findings) = load("robot.urdf", TOUCHING, &options);
+    let touching = touching.unwrap_or_else(|| panic!("{findings}"));
+    let findings = findings.to_string();
+    assert!(!findings.contains("touches nothing") && !findings.contains("`limit` is not used"), "{findings}");
+    assert_eq!(consts(touching.shapes[0].mount.placement.xyz), [0.0, 0.0, -0.5]);
+    assert_eq!((&touching.bodies, &touching.joints), (&free.bodies, &free.joints));
+    // Corners, ball, rims, ends of the capsule, and the stops of the joint that does not follow another.
+    let contacts: Vec<&str> = touching.contacts.iter().map(|c| c.name.as_str()).collect();
+    let numbered = |name: &str, n: usize| (1..=n).map(|k| format!("floor/{name}/{k}")).collect::<Vec<_>>();
+    let wanted = [
+        numbered("base", 8),
+        vec!["floor/base_shape_2".to_string()],
+        numbered("foot", 2),
+        numbered("foot_shape_2", 2),
+        vec!["j/lower".into(), "j/upper".into()],
+    ];
+    assert_eq!(contacts, wanted.concat());
+    assert!(touching.contacts[..13].iter().all(|c| c.friction == 0.7));
+    let (fixed, _) = load("robot.urdf", TOUCHING, &ImportOptions { base: Base::Fixed, ..options });
+    // The base is welded to the ground, and the next link turns about a joint on it.
+    assert_eq!(fixed.map(|m| m.contacts.len()), Some(2));
+}
+
+/// What is wrong with shapes that nobody asked for is no error.
+#[test]
+fn shapes_that_cannot_be_read_are_left_out() {
+    let collision = |inside: &str| format!("<collision>{inside}</collision>");
+    let bad = [
+        "",
+        "<geometry/>",
+        "<geometry><box size='1 2'/></geometry>",
+        "<geometry><box size='1 2 x'/></geometry>",
+        "<geometry><box size='1 2 3 4'/></geometry>",
+        "<geometry><sphere radius='-1'/></geometry>",
+        "<geometry><sphere radius='0'/></geometry>",
+        "<geometry><sphere radius='1e999'/></geometry>",
+        "<geometry><cylinder radius='1'/></geometry>",
+        "<geometry><plane normal='0 0 1'/></geometry>",
+        "<origin xyz='1 2'/><geometry><sphere radius='1'/></geometry>",
+    ];
+    for bad in bad {
+        let link = link("a").replace("<inertial>", &format!("{}<inertial>", collision(bad)));
+        let text = format!("<robot name='r'>{link}</robot>");
+        let (m, findings) = model(&text, Base::Floating);
+        assert!(m.shapes.is_empty() && findings.contains("a `collision` is not used"), "{bad}: {findings}");
+    }
+}
+
+/// Many shapes of one name do not take long.
+#[test]
+fn a_hundred_thousand_shapes_have_names() {
+    let shapes = "<collision><geometry><sphere radius='1'/></geometry></collision>".repeat(100_000);
+    let text = format!("<robot name='r'>{}</robot>", link("a").replace("<inertial>", &format!("{shapes}<inertial>")));
+    assert_eq!(model(&text, Base::Floating).0.shapes.len(), 100_000);
 }

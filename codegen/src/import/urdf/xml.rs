@@ -29,14 +29,15 @@ pub(super) fn shown<'a>(node: Node<'a, '_>) -> &'a str {
 }
 
 /// Whether the name of `node` is one of this file's own: in no namespace, or in the one the root element has.
-fn is_own(node: Node) -> bool {
+pub(super) fn is_own(node: Node) -> bool {
     let space = node.tag_name().namespace();
     space.is_none() || space == node.document().root_element().tag_name().namespace()
 }
 
 impl Reader<'_, '_> {
     /// Sorts the child elements of `node`: those named in `used` are returned in file order, those in `ignored` are
-    /// counted with the message that stands there, all others are warned about, as is text between them.
+    /// counted with the message that stands there, if there is one, all others are warned about, as is text between
+    /// them.
     pub fn children<'x, 'i>(
         &mut self,
         node: Node<'x, 'i>,
@@ -57,7 +58,9 @@ impl Reader<'_, '_> {
             } else if used.contains(&name) {
                 found.push(child);
             } else if let Some((_, message)) = ignored.iter().find(|(known, _)| *known == name) {
-                self.tally.notice(place(child), message);
+                if !message.is_empty() {
+                    self.tally.notice(place(child), message);
+                }
             } else {
                 self.unknown_element(node, child, used.iter().copied().chain(ignored.iter().map(|i| i.0)));
             }

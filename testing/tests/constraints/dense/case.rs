@@ -28,7 +28,11 @@ pub fn system(seed: u64) -> LoopSystem {
         0 => random_loops(seed, &LoopKnobs::plain()),
         // In a plane, only two or three rows of each joint that closes a loop are independent.
         1 => {
-            let kinds = [3.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.5, 0.0, 0.5, 0.5, 0.0];
+            let mut kinds = [0.0; 20];
+            for (k, weight) in [(0, 3.0), (1, 1.0), (6, 1.0), (7, 1.0), (8, 1.0), (9, 1.0)] {
+                kinds[k] = weight;
+            }
+            [12, 14, 15, 16, 17, 18].iter().for_each(|k| kinds[*k] = 0.5);
             let tree = Distribution {
                 bodies: (3, 8),
                 branching: 0.3,

@@ -1,0 +1,168 @@
+//! `collision`: the shapes of a link.
+//!
+//! Most readers of a robot want no contacts. What is wrong with a shape is therefore a warning, and the shape left out.
+
+use std::collections::{HashMap, HashSet};
+
+use super::unused::Tally;
+use super::xml::{is_own, place, Reader};
+use crate::diag::Severity;
+use crate::import::raw::{RawNumber, RawPlacement, RawRotation, RawShape, RawValue, RawVec3};
+use crate::import::source::{Span, Spanned};
+use crate::import::words::quote;
+use crate::model::{ShapeSpec, SHAPES};
+use crate::names::identifier;
+use roxmltree::Node;
+
+const IDLE: &str = "a `collision` touches nothing unless a floor is asked for (`--floor` of `mbd simulate`)";
+const MESH: &str = "`mesh` of a `collision` is not used: only box, sphere, cylinder and capsule are read";
+
+/// As many contacts as a shape has with a plane: the corners of a box.
+const CONTACTS: usize = 8;
+
+/// The names of the shapes that were read.
+#[derive(Default)]
+pub(super) struct Taken {
+    identifiers: HashSet<String>,
+    /// The last number behind a name.
+    last: HashMap<String, usize>,
+}
+
+impl Taken {
+    /// `wanted`, with a number where an identifier that it becomes is taken: its own, or one of its contacts, which are
+    /// numbered.
+    pub(super) fn free(&mut self, wanted: &str) -> String {
+        let of = |name: &str| {
+            let own = identifier(name);
+            (1..=CONTACTS).map(|k| format!("{own}_{k}")).chain([own.clone()]).collect::<Vec<_>>()
+        };
+        let mut name = wanted.to_string();
+        let mut all = of(&name);
+        while all.iter().any(|one| self.identifiers.contains(one)) {
+            let last = self.last.entry(wanted.to_string()).or_insert(1);
+            *last += 1;
+            name = format!("{wanted}_shape_{last}");
+            all = of(&name);
+        }
+        self.identifiers.extend(all);
+        name
+    }
+}
+
+/// Reads the shapes of a link. Without a floor they are said to touch nothing.
+pub(super) fn all(
+    reader: &mut Reader,
+    link: Node,
+    body: &Spanned<String>,
+    floor: bool,
+    taken: &mut Taken,
+    shapes: &mut Vec<RawShape>,
+) {
+    for node in elements(link).filter(|n| n.tag_name().name() == "collision") {
+        match shape(reader, node, body, taken) {
+            Ok(shape) => {
+                shapes.push(shape);
+                if !floor {
+                    reader.tally.notice(place(node), IDLE);
+                }
+            }
+            Err(Unread::Mesh(at)) => reader.tally.notice(at, MESH),
+            Err(Unread::Faulty(at, what)) => faulty(&mut reader.tally, at, &what),
+        }
+    }
+}
+
+fn elements<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> {
+    node.children().filter(|child| child.is_element() && is_own(*child))
+}
+
+fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
+    elements(node).find(|child| child.tag_name().name() == name)
+}
+
+/// Why a shape was left out.
+enum Unread {
+    Mesh(Span),
+    Faulty(Span, String),
+}
+
+fn faulty(tally: &mut Tally, at: Span, what: &str) {
+    let message = format!("a `collision` is not used: {what}");
+    let help = "write one box, sphere, cylinder or capsule with lengths in metres, greater than 0; or remove it";
+    tally.add(Severity::Warning, "collision", at, message, help);
+}
+
+fn shape(reader: &Reader, node: Node, body: &Spanned<String>, taken: &mut Taken) -> Result<RawShape, Unread> {
+    let geometry = child(node, "geometry").ok_or_else(|| Unread::Faulty(place(node), "it has no `geometry`".into()))?;
+    let solid = elements(geometry).next().ok_or_else(|| Unread::Faulty(place(geometry), "it has no shape".into()))?;
+    let word = solid.tag_name().name();
+    if word == "mesh" {
+        return Err(Unread::Mesh(place(solid)));
+    }
+    let Some(spec) =
+        SHAPES.iter().find(|spec| spec.word() == word && ["box", "sphere", "cylinder", "capsule"].contains(&word))
+    else {
+        return Err(Unread::Faulty(place(solid), format!("{} is no shape", quote(word))));
+    };
+    let key = |key: &str| spec.keys.contains(&key);
+    let radius = key("radius").then(|| length(reader, solid, "radius")).transpose()?;
+    let length = key("length").then(|| length(reader, solid, "length")).transpose()?;
+    let size = key("size").then(|| lengths(reader, solid)).transpose()?;
+    let placement = match child(node, "origin") {
+        None => RawPlacement::default(),
+        Some(origin) => RawPlacement {
+            xyz: triple(reader, origin, "xyz")?,
+            rotation: triple(reader, origin, "rpy")?.map(RawRotation::Rpy),
+        },
+    };
+    let given = reader.attribute(node, "name").map(|n| n.value.trim()).filter(|n| !n.is_empty());
+    let name = taken.free(given.unwrap_or(&body.value));
+    Ok(RawShape {
+        name: Spanned::new(name, place(node)),
+        body: Some(body.clone()),
+        kind: Some(Spanned::new(spec as &'static ShapeSpec, place(solid))),
+        placement,
+        radius,
+        length,
+        size,
+        normal: None,
+    })
+}
+
+/// Finite numbers under a key; `None` where there is no such attribute.
+fn numbers<const N: usize>(reader: &Reader, node: Node, key: &str) -> Result<Option<Spanned<[f64; N]>>, Unread> {
+    let Some(text) = reader.attribute(node, key) else { return Ok(None) };
+    let all: Vec<f64> = text.value.split_whitespace().map_while(|word| word.parse().ok()).collect();
+    match <[f64; N]>::try_from(all) {
+        Ok(all) if all.iter().all(|x| x.is_finite()) && text.value.split_whitespace().count() == N => {
+            Ok(Some(Spanned::new(all, text.span)))
+        }
+        _ => Err(Unread::Faulty(text.span, format!("its `{key}` is {}", quote(text.value)))),
+    }
+}
+
+fn positive<const N: usize>(reader: &Reader, node: Node, key: &str) -> Result<Spanned<[f64; N]>, Unread> {
+    let missing = || Unread::Faulty(place(node), format!("a {} needs a `{key}`", node.tag_name().name()));
+    let all = numbers::<N>(reader, node, key)?.ok_or_else(missing)?;
+    match all.value.iter().find(|x| **x <= 0.0) {
+        Some(x) => Err(Unread::Faulty(all.span, format!("its `{key}` is {x}"))),
+        None => Ok(all),
+    }
+}
+
+fn length(reader: &Reader, node: Node, key: &str) -> Result<RawNumber, Unread> {
+    let Spanned { value: [x], span } = positive::<1>(reader, node, key)?;
+    Ok(Spanned::new(RawValue::Const(x), span))
+}
+
+fn lengths(reader: &Reader, node: Node) -> Result<RawVec3, Unread> {
+    Ok(raw(positive::<3>(reader, node, "size")?))
+}
+
+fn triple(reader: &Reader, node: Node, key: &str) -> Result<Option<RawVec3>, Unread> {
+    Ok(numbers::<3>(reader, node, key)?.map(raw))
+}
+
+fn raw(all: Spanned<[f64; 3]>) -> RawVec3 {
+    Spanned::new(all.value.map(|x| Spanned::new(RawValue::Const(x), all.span)), all.span)
+}

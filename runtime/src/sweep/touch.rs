@@ -1,0 +1,127 @@
+//! Where two rounded or edged bodies are nearest: distance, normal and contact point.
+//!
+//! Sweeps cannot branch on a value. Which face, edge or end is nearest is therefore chosen by factors that are exactly
+//! 0 or 1 and have derivatives of zero. Distances and contact points are continuous; derivatives are those of the part
+//! that is nearest.
+
+use crate::spatial::{add3, dot3, scale3, Vec3};
+use crate::workspace::Relative;
+use crate::Scalar;
+
+/// Contact of two bodies, on the frames `A` and `B`, with components of `B`.
+pub(super) struct Touch<S> {
+    /// Distance of the surfaces, m; negative where they overlap.
+    pub gap: S,
+    /// Normal of both surfaces, towards the second body.
+    pub normal: Vec3<S>,
+    /// The contact point on the second body, from the origin of `B`, m.
+    pub at: Vec3<S>,
+}
+
+/// 1 where `x` is above zero by more than the rounding of 1, 0 elsewhere.
+fn above<S: Scalar>(x: S) -> S {
+    S::one().reciprocal_above(S::one() - x)
+}
+
+/// 1 or −1, as the sign of `x`.
+fn sign<S: Scalar>(x: S) -> S {
+    S::constant(2.0) * above(x) - S::one()
+}
+
+/// `x` where it is between `-half` and `half`, the nearest of these two elsewhere. Where `half` is zero, so are the result
+/// and its derivative.
+fn clamp<S: Scalar>(x: S, half: S) -> S {
+    let inside = above(half - x) * above(half + x);
+    inside * x + (S::one() - inside) * (sign(x) * half)
+}
+
+impl<S: Scalar> Touch<S> {
+    /// A ball about `middle`, from the origin of `B`, with another ball that is `apart` before it.
+    fn new(middle: Vec3<S>, apart: Vec3<S>, radii: &[S; 2]) -> Touch<S> {
+        // Points that coincide have no direction: the addend, far below the rounding of any other distance, gives zero.
+        let distance = (dot3(apart, apart) + S::constant(1e-36)).sqrt();
+        let normal = scale3(S::one() / distance, apart);
+        Touch { gap: distance - (radii[0] + radii[1]), normal, at: add3(middle, scale3(-radii[1], normal)) }
+    }
+
+    /// Balls about both origins.
+    pub fn balls(at: &Relative<S>, radii: &[S; 2]) -> Touch<S> {
+        Touch::new([S::zero(); 3], at.d, radii)
+    }
+
+    /// Balls that pass along segments of these lengths about both origins, along z of either frame: capsules, or balls
+    /// where a length is zero.
+    pub fn capsules(at: &Relative<S>, lengths: &[S; 2], radii: &[S; 2]) -> Touch<S> {
+        let [first, second] = lengths.map(|length| S::constant(0.5) * length);
+        let (z, d) = (at.axis(2), at.d);
+        // The lines are nearest where they cross as seen along z of `B`. Where the square of the sine of the angle
+        // between them has no digits left, they are parallel and nearest along all their common part, of which the
+        // middle is taken.
+        let inverse = (z[0] * z[0] + z[1] * z[1]).reciprocal_above(S::constant(1e-24));
+        let along = dot3(z, d);
+        let common = S::constant(0.5) * (clamp(along - second, first) + clamp(along + second, first));
+        let crossing = (z[0] * d[0] + z[1] * d[1]) * inverse + (S::one() - above(inverse)) * common;
+        // What is nearest to the nearest point of a segment is nearest of all after one return.
+        let there = clamp(crossing, first);
+        let here = clamp(there * z[2] - d[2], second);
+        let there = clamp(along + here * z[2], first);
+        let middle = [S::zero(), S::zero(), here];
+        Touch::new(middle, add3(add3(d, middle), scale3(-there, z)), radii)
+    }
+
+    /// A ball about the origin of `B` on a box about that of `A`, with edges of these lengths along its axes.
+    pub fn ball_on_box(at: &Relative<S>, size: &[S; 3], radius: S) -> Touch<S> {
+        let mut faces = [(S::zero(), [S::zero(); 3]); 3];
+        for (k, face) in faces.iter_mut().enumerate() {
+            *face = ends(at.axis(k), at.d, size[k]);
+        }
+        Touch::ball_on_faces(&faces, radius)
+    }
+
+    /// A ball about the origin of `B` on a cylinder about that of `A` and its z; `radii` of the cylinder and the ball.
+    pub fn ball_on_cylinder(at: &Relative<S>, length: S, radii: &[S; 2]) -> Touch<S> {
+        let across = at.across();
+        // On the axis itself there is no direction across it: the addend gives zero.
+        let distance = (dot3(across, across) + S::constant(1e-36)).sqrt();
+        let mantle = (distance - radii[0], scale3(S::one() / distance, across));
+        Touch::ball_on_faces(&[mantle, ends(at.axis(2), at.d, length)], radii[1])
+    }
+
+    /// A ball about the origin of `B` on a body that is behind all of some faces, which are at right angles to each other:
+    /// for each face how far before it the middle is, m, and its normal. Outside, the distance of the middle is that of
+    /// the face, edge or corner that is nearest; inside, it is that of the nearest face, negative.
+    fn ball_on_faces<const N: usize>(faces: &[(S, Vec3<S>); N], radius: S) -> Touch<S> {
+        let (mut inside, mut largest) = (S::one(), faces[0].0);
+        // 1 for the face that is the nearest from inside.
+        let mut nearest = [S::zero(); N];
+        nearest[0] = S::one();
+        for (k, (before, _)) in faces.iter().enumerate() {
+            inside = inside * (S::one() - above(*before));
+            if k > 0 {
+                let nearer = above(*before - largest);
+                let stays = S::one() - nearer;
+                nearest[..k].iter_mut().for_each(|x| *x = stays * *x);
+                nearest[k] = nearer;
+                largest = stays * largest + nearer * *before;
+            }
+        }
+        let (mut normal, mut square) = ([S::zero(); 3], S::zero());
+        for ((before, outward), nearest) in faces.iter().zip(nearest) {
+            let part = above(*before) * *before + inside * nearest;
+            normal = add3(normal, scale3(part, *outward));
+            square = square + part * part;
+        }
+        let length = square.sqrt();
+        let normal = scale3(S::one() / length, normal);
+        let distance = (S::one() - inside) * length + inside * largest;
+        Touch { gap: distance - radius, normal, at: scale3(-radius, normal) }
+    }
+}
+
+/// The nearer of two faces that are `length` apart, across `axis` and on either side of the first origin: how far before
+/// it the second origin, at `d`, is, and its normal.
+fn ends<S: Scalar>(axis: Vec3<S>, d: Vec3<S>, length: S) -> (S, Vec3<S>) {
+    let along = dot3(axis, d);
+    let side = sign(along);
+    (side * along - S::constant(0.5) * length, scale3(side, axis))
+}
