@@ -12,8 +12,8 @@ use multibody::codegen::{Arithmetic, Options};
 use multibody::runtime::catalogue::{self, BoxedMethod};
 use multibody::runtime::constrained::{Effort, Projection, WithPostStep};
 use multibody::runtime::contact::{
-    Cause, ContactEvent, ContactObserver, ContactStatistics, Hybrid, HybridError, Mode, ModeTable, Stretch,
-    WithContacts,
+    Cause, ContactEvent, ContactMotion, ContactObserver, ContactStatistics, HybridError, Mode, ModeTable, Regime,
+    RegimeChange, RegimeChoice, RegimeReason, RegimeStatistics, SteppingStatistics, Stretch, WithContacts,
 };
 use multibody::runtime::integrate::Statistics;
 use multibody::runtime::Conjugate;
@@ -34,10 +34,18 @@ pub struct Touched {
     pub record: Record,
     /// Its events, in the order of time.
     pub events: Vec<ContactEvent<f64>>,
-    /// What happened at the contacts.
+    /// What happened at the contacts, followed by events.
     pub contacts: ContactStatistics,
-    /// The contacts that are closed at the end.
+    /// What happened at the contacts in time steps.
+    pub stepping: SteppingStatistics,
+    /// Times in events and in time steps, and the changes between them.
+    pub regimes: RegimeStatistics,
+    /// These changes, in the order of time.
+    pub changes: Vec<RegimeChange>,
+    /// The contacts that are closed at the end, by events.
     pub closed: Vec<(usize, Mode)>,
+    /// The contacts that press at the end, by time steps, which do not tell whether these slide.
+    pub pressed: Vec<usize>,
     /// The sets of modes that were visited, and the time that was spent in each, s.
     pub visits: Vec<(Vec<Mode>, f64)>,
     /// Computing time, s.
@@ -48,6 +56,7 @@ pub struct Touched {
 struct Observer {
     record: Record,
     events: Vec<ContactEvent<f64>>,
+    changes: Vec<RegimeChange>,
     visits: Vec<(Vec<Mode>, f64)>,
     every: f64,
     time: f64,
@@ -103,6 +112,10 @@ impl ContactObserver<Mechanism> for Observer {
     fn event(&mut self, _system: &mut System, event: &ContactEvent<f64>) {
         self.events.push(*event);
     }
+
+    fn regime(&mut self, _system: &mut System, change: &RegimeChange) {
+        self.changes.push(*change);
+    }
 }
 
 /// The method of the settings around which contacts are followed.
@@ -114,8 +127,12 @@ fn method(settings: &Settings, system: &System) -> Outcome<BoxedMethod<'static, 
             format!("take one of {}", names.join(", ")),
         ));
     };
-    let effort = Effort { energy: f64::INFINITY, ..Effort::default() };
-    Ok(Box::new(WithPostStep::new(system, method, Projection::new(system, settings.hold, effort))))
+    Ok(Box::new(WithPostStep::new(system, method, projection(settings, system))))
+}
+
+/// What closes loops and contacts.
+fn projection(settings: &Settings, system: &System) -> Projection<System> {
+    Projection::new(system, settings.hold, Effort { energy: f64::INFINITY, ..Effort::default() })
 }
 
 /// A mechanism with contacts, in exact arithmetic, so that machine code gives the bits of the interpreter.
@@ -141,6 +158,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let mut observer = Observer {
         record: Record::default(),
         events: Vec::new(),
+        changes: Vec::new(),
         visits: Vec::new(),
         every: settings.every,
         time: settings.time,
@@ -150,25 +168,39 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let clock = Instant::now();
     observer.row(&mut system, 0.0);
     let (q, p) = (observer.q.clone(), observer.p.clone());
-    let mut motion = Hybrid::new(&mut system, method, settings.step, 0.0, &q, &p).map_err(failed)?;
+    let (close, rules, start) = (projection(settings, &system), settings.regimes, (&q, &p));
+    let motion = ContactMotion::new(&mut system, (method, settings.step), close, rules, 0.0, start);
+    let mut motion = motion.map_err(failed)?;
     motion.run(&mut system, settings.time, &mut observer).map_err(failed)?;
-    let statistics: Statistics = motion.statistics();
-    let modes = system.modes().iter().copied().enumerate();
+    let statistics: Statistics = motion.integration_statistics();
+    let (modes, count) = (system.modes().iter().copied().enumerate(), system.modes().len());
     Ok(Touched {
         record: Record { statistics, ..observer.record },
         events: observer.events,
         visits: observer.visits,
         contacts: *motion.contact_statistics(),
+        stepping: *motion.stepping_statistics(),
+        regimes: *motion.statistics(),
+        changes: observer.changes,
         closed: modes.filter(|(_, mode)| *mode != Mode::Open).collect(),
+        pressed: match motion.regime() {
+            Regime::Events => Vec::new(),
+            Regime::TimeSteps => (0..count).filter(|k| motion.steps.pressed()[*k]).collect(),
+        },
         seconds: clock.elapsed().as_secs_f64(),
     })
 }
 
 /// What computed the steps.
-pub fn ways(touched: &Touched) -> String {
+pub fn ways(touched: &Touched, choice: RegimeChoice) -> String {
     let [_, _, compiled, interpreted] = touched.contacts.steps;
-    let sets = touched.visits.len();
-    format!("{compiled} steps by machine code, {interpreted} by the interpreter, {sets} sets of modes")
+    let (sets, steps) = (touched.visits.len(), touched.stepping.steps);
+    let events = format!("{compiled} steps by machine code, {interpreted} by the interpreter, {sets} sets of modes");
+    match choice {
+        RegimeChoice::Events => events,
+        RegimeChoice::TimeSteps => format!("{steps} time steps"),
+        RegimeChoice::Automatic => format!("{events}; {steps} time steps"),
+    }
 }
 
 /// The failure of a run: the contact by its name.
@@ -222,11 +254,62 @@ fn unit(plan: &Plan, k: usize) -> &'static str {
     }
 }
 
+/// Why a motion changed between events and time steps.
+fn reason(reason: &RegimeReason) -> String {
+    match reason {
+        RegimeReason::ManyEvents(count) => format!("{count} events followed one another"),
+        RegimeReason::ManySteps(count) => format!("events needed {count} steps"),
+        RegimeReason::Failed(error) => error.to_string(),
+        RegimeReason::Quiet => "the contacts that press stay the same".to_string(),
+        _ => "another reason".to_string(),
+    }
+}
+
+/// Where the motion was followed by events and where by time steps.
+fn report_regimes(touched: &Touched, out: &mut dyn Write) -> Outcome {
+    let Touched { regimes, changes, stepping, .. } = touched;
+    let [events, steps] = regimes.time;
+    writeln!(out, "regimes: {events:.6} s by events, {steps:.6} s by time steps, {} changes", regimes.changes)?;
+    for change in changes.iter().take(SHOWN) {
+        let name = if change.regime == Regime::Events { "events" } else { "time steps" };
+        writeln!(out, "  {:>12.9} s  {name}: {}", change.time, reason(&change.reason))?;
+    }
+    if changes.len() > SHOWN {
+        writeln!(out, "  and {} more", changes.len() - SHOWN)?;
+    }
+    let SteppingStatistics { steps, touched, most, residual, overlap, .. } = stepping;
+    if *steps == 0 {
+        return Ok(());
+    }
+    writeln!(
+        out,
+        "time steps: {steps}, {touched} of them with impulses, of at most {most} contacts; residual at most {residual:.1e} of \
+         the impulses, overlap at most {overlap:.1e} m or rad"
+    )?;
+    if regimes.closed > 0.0 {
+        writeln!(
+            out,
+            "closed: gaps and overlaps up to {:.1e} m or rad, where events followed time steps",
+            regimes.closed
+        )?;
+    }
+    Ok(())
+}
+
 /// The first events, the contacts at the end, and what impacts took.
-pub fn report(plan: &Plan, touched: &Touched, out: &mut dyn Write) -> Outcome {
+pub fn report(plan: &Plan, touched: &Touched, choice: RegimeChoice, out: &mut dyn Write) -> Outcome {
     let Touched { events, contacts, closed, .. } = touched;
     let (count, impacts) = (contacts.events, contacts.impacts);
-    writeln!(out, "events: {count}, {impacts} of them with an impact, {} changes of contact modes", contacts.switches)?;
+    if choice != RegimeChoice::Events {
+        report_regimes(touched, out)?;
+    }
+    if choice != RegimeChoice::TimeSteps {
+        writeln!(
+            out,
+            "events: {count}, {impacts} of them with an impact, {} changes of contact modes",
+            contacts.switches
+        )?;
+    }
     for event in events.iter().take(SHOWN) {
         let mut line = format!("  {:>12.9} s  {} {}", event.time, name(plan, event.contact), cause(event.cause));
         if event.impact.is_some() {
@@ -240,7 +323,10 @@ pub fn report(plan: &Plan, touched: &Touched, out: &mut dyn Write) -> Outcome {
     if events.len() > SHOWN {
         writeln!(out, "  and {} more", events.len() - SHOWN)?;
     }
-    if closed.is_empty() {
+    if !touched.pressed.is_empty() {
+        let list: Vec<&str> = touched.pressed.iter().map(|k| name(plan, *k)).collect();
+        writeln!(out, "contacts that press at the end: {}", list.join(", "))?;
+    } else if closed.is_empty() {
         writeln!(out, "contacts at the end: all open")?;
     } else {
         let list: Vec<String> =
@@ -252,10 +338,14 @@ pub fn report(plan: &Plan, touched: &Touched, out: &mut dyn Write) -> Outcome {
     let last = record.energy.len() - 1;
     writeln!(
         out,
-        "energy: {:.9} J at the start, {:.9} J at the end; impacts took {:.9} J",
+        "energy: {:.9} J at the start, {:.9} J at the end; impacts took {:.9} J{}",
         energy(0),
         energy(last),
-        contacts.lost
+        contacts.lost,
+        match choice {
+            RegimeChoice::Events => String::new(),
+            _ => format!(", impulses of time steps {:.9} J", touched.stepping.lost),
+        }
     )?;
     if contacts.impacts > 0 {
         writeln!(

@@ -13,6 +13,7 @@ use multibody::runtime::catalogue::{self, BoxedMethod};
 use multibody::runtime::constrained::{
     ConstraintError, Effort, PostStep, Projection, SingularPosition, Stabilisation, WithPostStep,
 };
+use multibody::runtime::contact::RegimeRules;
 use multibody::runtime::integrate::{Control, EnergyProjection, Solver, Statistics, Step, StepError};
 use multibody::runtime::{Constrained, Interpreter, Real, Scalar, System};
 
@@ -37,6 +38,8 @@ pub struct Settings<'a> {
     pub hold: Stabilisation,
     /// Whether the interpreter computes everything.
     pub interpreted: bool,
+    /// How contacts are followed.
+    pub regimes: RegimeRules,
 }
 
 impl Settings<'_> {

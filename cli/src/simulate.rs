@@ -10,11 +10,12 @@ use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
 use multibody::runtime::catalogue;
 use multibody::runtime::constrained::{SingularPosition, Stabilisation};
+use multibody::runtime::contact::{RegimeChoice, RegimeRules};
 use multibody::runtime::integrate::{Control, Statistics, Step, Tolerances};
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Interpreter, System};
 
-use super::args::SimulateArgs;
+use super::args::{ContactRegime, SimulateArgs};
 use super::motion::{simulate, Drift, Record, Settings, Spent};
 use super::output::{note, writable, write_files};
 use super::plot::{self, Panel};
@@ -92,6 +93,12 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     if model.contacts.is_empty() && args.record_modes.is_some() {
         return Err(Failure::new(
             format!("--record-modes: `{}` has no contacts", model.name),
+            "leave it out, or add [[shape]] and [[contact]] to the model",
+        ));
+    }
+    if model.contacts.is_empty() && args.contacts != ContactRegime::Events {
+        return Err(Failure::new(
+            format!("--contacts: `{}` has no contacts", model.name),
             "leave it out, or add [[shape]] and [[contact]] to the model",
         ));
     }
@@ -176,10 +183,17 @@ fn with_contacts(
     files.extend(modes.as_ref().map(|(file, text)| (*file, text.as_str())));
     write_files(&files)?;
     writeln!(out, "{}", title(plan, settings))?;
-    contacts::report(plan, &touched, out)?;
-    writeln!(out, "work: {}", work(&record.statistics))?;
+    contacts::report(plan, &touched, settings.regimes.choice, out)?;
+    if settings.regimes.choice != RegimeChoice::TimeSteps {
+        writeln!(out, "work: {}", work(&record.statistics))?;
+    }
     let seconds = touched.seconds;
-    writeln!(out, "time: {seconds:.3} s, {}; {}", pace(args.time / seconds), contacts::ways(&touched))?;
+    writeln!(
+        out,
+        "time: {seconds:.3} s, {}; {}",
+        pace(args.time / seconds),
+        contacts::ways(&touched, settings.regimes.choice)
+    )?;
     let (rows, count) = (record.t.len(), touched.events.len());
     writeln!(out, "table: {} ({rows} rows)\nevents: {} ({count} rows)", csv.display(), beside.display())?;
     writeln!(out, "plot: {}", svg.display())?;
@@ -236,12 +250,42 @@ fn settings(args: &SimulateArgs) -> Outcome<Settings<'_>> {
         project: args.project,
         hold: args.hold,
         interpreted: args.interpreted,
+        regimes: regimes(args)?,
     })
+}
+
+/// How contacts are followed.
+fn regimes(args: &SimulateArgs) -> Outcome<RegimeRules> {
+    let choice = match args.contacts {
+        ContactRegime::Events => RegimeChoice::Events,
+        ContactRegime::Stepping => RegimeChoice::TimeSteps,
+        ContactRegime::Auto => RegimeChoice::Automatic,
+    };
+    if choice == RegimeChoice::TimeSteps {
+        let given = [("--method", args.method.is_some()), ("--tolerance", args.tolerance.is_some())];
+        let given = given.into_iter().chain([("--step", args.step.is_some()), ("--partial", args.partial)]);
+        let given: Vec<&str> = given.filter(|(_, given)| *given).map(|(name, _)| name).collect();
+        if !given.is_empty() {
+            return Err(Failure::new(
+                format!("--contacts stepping has a method of its own, for which {} means nothing", given.join(", ")),
+                "leave it out; --contact-step is the length of the steps",
+            ));
+        }
+        if args.time / args.contact_step > MOST_STEPS {
+            let steps = args.time / args.contact_step;
+            return Err(Failure::new(format!("{steps:.0} steps are too many"), "raise --contact-step or lower --time"));
+        }
+    }
+    Ok(RegimeRules::new(choice, args.contact_step))
 }
 
 /// The title of the plot, which is also the first line of the report.
 pub fn title(plan: &Plan, settings: &Settings) -> String {
     let Settings { method, time, step, .. } = settings;
+    if settings.regimes.choice == RegimeChoice::TimeSteps {
+        let h = settings.regimes.step;
+        return format!("{}: {time} s of free motion by time steps of {h} s (Moreau's midpoint rule)", plan.model.name);
+    }
     let title = catalogue::entry(method).map_or("", |e| e.title);
     let steps = match step {
         Step::Fixed(h) => format!("steps of {h} s"),

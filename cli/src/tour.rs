@@ -11,6 +11,7 @@ use multibody::codegen::read::{self, ImportOptions};
 use multibody::codegen::search;
 use multibody::codegen::{Options, Output};
 use multibody::runtime::constrained::Stabilisation;
+use multibody::runtime::contact::RegimeRules;
 use multibody::runtime::integrate::{Rk4, Step, Stepper};
 use multibody::runtime::Interpreter;
 
@@ -161,6 +162,7 @@ fn settings() -> Settings<'static> {
         project: false,
         hold: Stabilisation::default(),
         interpreted: true,
+        regimes: RegimeRules::default(),
     }
 }
 

@@ -346,6 +346,12 @@ pub struct SimulateArgs {
     /// Time from one row of the table to the next, s
     #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "rows")]
     pub every: Option<f64>,
+    /// How contacts are followed
+    #[arg(long, value_enum, value_name = "HOW", default_value = "events")]
+    pub contacts: ContactRegime,
+    /// Time step of `--contacts stepping` and `auto`, s
+    #[arg(long, value_name = "S", value_parser = positive, default_value_t = 1e-3)]
+    pub contact_step: f64,
     /// File to write with the sets of modes of the contacts that the motion visits, for `mbd generate --modes`
     #[arg(long, value_name = "FILE")]
     pub record_modes: Option<PathBuf>,
@@ -364,6 +370,18 @@ pub struct SimulateArgs {
     /// Number of instants that are drawn
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub strobes: u16,
+}
+
+/// How contacts are followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ContactRegime {
+    /// From event to event: landings, slip and partings are found to rounding errors
+    Events,
+    /// By time steps of `--contact-step` with the impulses of all contacts at once; the error is about what happens in
+    /// a step
+    Stepping,
+    /// From event to event, and by time steps while events crowd or cannot be resolved; the report says when
+    Auto,
 }
 
 /// The second run of `--trust`.

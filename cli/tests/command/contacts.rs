@@ -49,6 +49,37 @@ fn what_cannot_be_simulated_is_refused() {
 }
 
 #[test]
+fn contacts_are_followed_by_time_steps() {
+    let folder = folder("contacts_stepping");
+    let run = |how: &str, more: &[&str]| {
+        let arguments = ["simulate", &shipped("bouncing_ball"), "--time", "3", "--rows", "3", "--contacts", how];
+        let output = good(run_in(&folder, &[&arguments, more].concat()));
+        let table = std::fs::read_to_string(folder.join("bouncing_ball.csv")).expect("a table");
+        let last = table.lines().last().and_then(|row| row.split(',').nth(3)).expect("a height");
+        (out(&output).to_string(), last.parse::<f64>().expect("a number"))
+    };
+    let (_, exact) = run("events", &[]);
+    let (report, height) = run("stepping", &["--contact-step", "1e-4"]);
+    assert!(report.contains("3 s of free motion by time steps of 0.0001 s"), "{report}");
+    assert!(report.contains("regimes: 0.000000 s by events, 3.000000 s by time steps, 0 changes"), "{report}");
+    assert!(report.contains("time steps: 30000, "), "{report}");
+    // Each of six landings at up to 4.4 m/s is late by up to a step.
+    assert!((height - exact).abs() < 6.0 * 2.0 * 4.4 * 1e-4, "{height} {exact}");
+    // Few events: nothing changes.
+    let (report, height) = run("auto", &[]);
+    assert!(report.contains("regimes: 3.000000 s by events, 0.000000 s by time steps, 0 changes"), "{report}");
+    assert_eq!(height, exact);
+
+    let ball = shipped("bouncing_ball");
+    let both = ["simulate", &ball, "--contacts", "stepping", "--tolerance", "1e-6", "--method", "dop853"];
+    let text = "--contacts stepping has a method of its own, for which --method, --tolerance means nothing";
+    bad(run_in(&folder, &both), &[text, "--contact-step"]);
+    let pendulum = format!("{ROOT}/models/double_pendulum.toml");
+    let without = ["simulate", &pendulum, "--contacts", "auto"];
+    bad(run_in(&folder, &without), &["--contacts: `double_pendulum` has no contacts"]);
+}
+
+#[test]
 fn modes_are_recorded_counted_and_generated() {
     let folder = folder("contacts_modes");
     let hopper = shipped("hopper");

@@ -9,6 +9,7 @@ mod hybrid;
 mod instant;
 #[cfg(feature = "alloc")]
 mod mode_table;
+mod motion;
 mod solver;
 mod stepping;
 mod touching;
@@ -17,10 +18,11 @@ mod with_contacts;
 pub use hybrid::{Cause, ContactEvent, ContactObserver, ContactRules, ContactStatistics, Hybrid, HybridError, Stretch};
 #[cfg(feature = "alloc")]
 pub use mode_table::{ContactInterpreter, ModeTable, Reducible};
+pub use motion::{ContactMotion, Regime, RegimeChange, RegimeChoice, RegimeReason, RegimeRules, RegimeStatistics};
 pub use solver::{
     impact, solve, work_len, Certificate, ContactError, Effort, Impact, ImpactOptions, ImpactOrder, Problem, Touch,
 };
-pub use stepping::{SteppingStatistics, TimeStepping};
+pub use stepping::{LastTimeStep, SteppingStatistics, TimeStepping};
 pub use touching::Touching;
 pub use with_contacts::WithContacts;
 

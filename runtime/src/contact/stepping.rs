@@ -14,7 +14,7 @@
 //! that of an impact with velocities that approach no slower. What friction holds does not move.
 
 use super::instant::Touches;
-use super::{impact, Certificate, ContactRules, HybridError, ImpactOptions, Touching, WithContacts};
+use super::{impact, Certificate, ContactRules, HybridError, ImpactOptions, Stretch, Touching, WithContacts};
 use crate::constrained::PostStep;
 use crate::error::StepError;
 use crate::integrate::{Chart, Point};
@@ -29,6 +29,8 @@ pub struct SteppingStatistics {
     pub steps: u64,
     /// Steps with impulses.
     pub touched: u64,
+    /// Steps in which other contacts had impulses than in the step before.
+    pub changes: u64,
     /// Steps whose restitution was reduced, so that no energy was gained.
     pub limited: u64,
     /// Largest number of contacts with an impulse in a step.
@@ -59,6 +61,11 @@ pub struct TimeStepping<Y: Touching, B> {
     pd: Y::Momenta,
     /// Velocities of the rows at the start of the step.
     before: Y::Rows,
+    /// Whether a contact had an impulse in the last step, and whether it has one in this step.
+    pressed: [Y::PerContact<bool>; 2],
+    /// Times of the ends of the last step, s, and the state at its start.
+    span: [Y::Scalar; 2],
+    last: (Y::Coordinates, Y::Momenta),
     touching: Touches<Y>,
     statistics: SteppingStatistics,
 }
@@ -83,6 +90,9 @@ where
             qd: inner.neutral(),
             pd: inner.zero_momenta(),
             before: inner.zero_rows(),
+            pressed: [inner.per_contact(false), inner.per_contact(false)],
+            span: [Y::Scalar::zero(); 2],
+            last: (inner.neutral(), inner.zero_momenta()),
             touching: Touches::new(inner),
             statistics: SteppingStatistics::default(),
         }
@@ -91,6 +101,16 @@ where
     /// What happened so far.
     pub fn statistics(&self) -> &SteppingStatistics {
         &self.statistics
+    }
+
+    /// Whether each contact had an impulse in the last step.
+    pub fn pressed(&self) -> &[bool] {
+        self.pressed[0].as_ref()
+    }
+
+    /// The last step, which ended in a state: what is between its ends, to first order.
+    pub fn last_step<'a>(&'a mut self, q: &'a Y::Coordinates, p: &'a Y::Momenta) -> LastTimeStep<'a, Y, B> {
+        LastTimeStep { stepping: self, q, p }
     }
 
     /// Takes a step of `h` s from time `t` (s).
@@ -110,24 +130,37 @@ where
         let middle = t + half;
         system.look(middle, &self.q, &self.p);
         self.take(system, half);
+        self.pressed[1].as_mut().fill(false);
         if self.touching.count > 0 {
             self.collide(system, middle)?;
             system.look(middle, &self.q, &self.p);
         }
         // Half a step with the velocities that were found; momenta of groups are those of the same motion there.
-        self.chart.load(system, middle.to_f64(), &self.q, &self.p)?;
-        self.displacement(system);
-        self.point.scale(half);
-        let Self { chart, point, .. } = self;
-        if let Some(index) = point.not_finite() {
-            return Err(StepError::NotFinite { time: t.to_f64(), index }.into());
-        }
-        chart.state(system, point, &mut self.q, &mut self.p);
+        self.drift(system, middle, half)?;
         let closed = self.post_step.close(system, t + h, false, &mut self.q, &mut self.p);
         closed.map_err(|error| StepError::Constraint { time: t.to_f64(), error })?;
+        self.span = [t, t + h];
+        self.last.0.as_mut().copy_from_slice(q.as_ref());
+        self.last.1.as_mut().copy_from_slice(p.as_ref());
         q.as_mut().copy_from_slice(self.q.as_ref());
         p.as_mut().copy_from_slice(self.p.as_ref());
         self.statistics.steps += 1;
+        let [last, now] = &mut self.pressed;
+        self.statistics.changes += u64::from(last.as_ref() != now.as_ref());
+        last.as_mut().copy_from_slice(now.as_ref());
+        Ok(())
+    }
+
+    /// Goes on from `self.q` and `self.p`, where the system was looked at, for a time, with the velocities there.
+    fn drift(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, time: Y::Scalar) -> Result<(), HybridError> {
+        self.chart.load(system, t.to_f64(), &self.q, &self.p)?;
+        self.displacement(system);
+        let Self { chart, point, q, p, .. } = self;
+        point.scale(time);
+        if let Some(index) = point.not_finite() {
+            return Err(StepError::NotFinite { time: t.to_f64(), index }.into());
+        }
+        chart.state(system, point, q, p);
         Ok(())
     }
 
@@ -234,6 +267,9 @@ where
             sum + touching.impulses.as_ref()[row] * (touching.b.as_ref()[row] - system.gap_rate(*k))
         });
         system.kick(touching.order(), touching.impulses.as_ref());
+        for (k, touch) in touching.order.as_ref()[..touching.count].iter().zip(touching.problem.as_ref()) {
+            self.pressed[1].as_mut()[*k] = touching.impulses.as_ref()[touch.contact.row] > Y::Scalar::zero();
+        }
         self.p.as_mut().copy_from_slice(system.p.as_ref());
         let s = &mut self.statistics;
         s.touched += 1;
@@ -242,6 +278,42 @@ where
         s.lost -= (result.energy - shift).to_f64();
         s.residual = s.residual.max(residual(&result.certificate));
         Ok(())
+    }
+}
+
+/// The last of the time steps.
+pub struct LastTimeStep<'a, Y: Touching, B> {
+    stepping: &'a mut TimeStepping<Y, B>,
+    q: &'a Y::Coordinates,
+    p: &'a Y::Momenta,
+}
+
+impl<Y, B> Stretch<Y> for LastTimeStep<'_, Y, B>
+where
+    Y: Touching,
+    B: PostStep<WithContacts<Y>>,
+{
+    fn span(&self) -> [Y::Scalar; 2] {
+        self.stepping.span
+    }
+
+    fn state(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
+        let [begin, end] = self.stepping.span;
+        let stepping = &mut *self.stepping;
+        let (at, from_q, from_p) = match t - begin < end - t {
+            true => (begin, stepping.last.0.as_ref(), stepping.last.1.as_ref()),
+            false => (end, self.q.as_ref(), self.p.as_ref()),
+        };
+        stepping.q.as_mut().copy_from_slice(from_q);
+        stepping.p.as_mut().copy_from_slice(from_p);
+        q.as_mut().copy_from_slice(from_q);
+        p.as_mut().copy_from_slice(from_p);
+        system.look(at, &stepping.q, &stepping.p);
+        // Where the state cannot be continued, that of the nearer end is the answer.
+        if stepping.drift(system, at, t - at).is_ok() {
+            q.as_mut().copy_from_slice(stepping.q.as_ref());
+            p.as_mut().copy_from_slice(stepping.p.as_ref());
+        }
     }
 }
 

@@ -2,9 +2,15 @@
 
 use mbd_codegen::model::Model;
 use mbd_codegen::plan::Plan;
+use mbd_runtime::catalogue::{self, BoxedMethod};
+use mbd_runtime::constrained::WithPostStep;
 use mbd_runtime::constrained::{Effort, Projection, Stabilisation};
-use mbd_runtime::contact::{SteppingStatistics, TimeStepping, WithContacts};
-use mbd_runtime::{Conjugate, Energetic};
+use mbd_runtime::contact::{
+    ContactMotion, ContactObserver, Effort as ContactEffort, HybridError, Regime, RegimeChange, RegimeChoice,
+    RegimeReason, RegimeRules, SteppingStatistics, TimeStepping, WithContacts,
+};
+use mbd_runtime::integrate::{Step, Tolerances};
+use mbd_runtime::{Conjugate, Energetic, System as _};
 use mbd_testing::random::Rng;
 
 use super::known::{ball, free_box};
@@ -144,4 +150,108 @@ fn a_quadruped_kneels_as_by_events() {
     stepped.run(3.0, 3_000);
     assert!((stepped.q[2] - 0.10155).abs() < 5e-3, "the trunk is at {} m", stepped.q[2]);
     assert!(stepped.statistics().overlap < 5e-3, "{:?}", stepped.statistics());
+}
+
+type System = WithContacts<Mechanism>;
+
+/// The changes of the regime, and the times at which rows of a table would be written.
+#[derive(Default)]
+struct Changes(Vec<RegimeChange>);
+
+impl ContactObserver<Mechanism> for Changes {
+    fn regime(&mut self, _system: &mut System, change: &RegimeChange) {
+        self.0.push(*change);
+    }
+}
+
+struct Chosen {
+    system: System,
+    motion: ContactMotion<Mechanism, BoxedMethod<'static, System>, Projection<System>>,
+    changes: Changes,
+}
+
+impl Chosen {
+    fn new(model: &Model, rules: RegimeRules, q: &[f64], v: &[f64]) -> Chosen {
+        let mut mechanism: Mechanism = Plan::new(model, 1e-9).default_contact_interpreter();
+        let (q, mut p) = (q.to_vec(), v.to_vec());
+        mechanism.conjugate_momenta(&q, &v.to_vec(), &mut p);
+        let mut system = WithContacts::new(mechanism);
+        let effort = Effort { energy: f64::INFINITY, ..Effort::default() };
+        let projection = |system: &System| Projection::new(system, Stabilisation::Mass, effort);
+        let method = catalogue::explicit("verner9", &system, false).expect("a method");
+        let method = Box::new(WithPostStep::new(&system, method, projection(&system)));
+        let step = (method as BoxedMethod<'static, System>, Step::Adaptive(Tolerances::new(1e-12)));
+        let close = projection(&system);
+        let motion = ContactMotion::new(&mut system, step, close, rules, 0.0, (&q, &p)).unwrap();
+        Chosen { system, motion, changes: Changes::default() }
+    }
+
+    fn run(&mut self, time: f64) -> (Vec<f64>, Vec<f64>) {
+        self.motion.run(&mut self.system, time, &mut self.changes).unwrap();
+        assert_eq!(self.motion.time(), time);
+        let inner = self.system.system();
+        let (mut q, mut p) = (inner.neutral(), inner.zero_momenta());
+        self.motion.state(&self.system, &mut q, &mut p);
+        (q, p)
+    }
+}
+
+#[test]
+fn crowded_bounces_are_stepped_over() {
+    // A ball that keeps 0.98 of its speed: from 1 m it would bounce 700 times before it lies still.
+    let time = 60.0;
+    for (rules, crowded) in
+        [(RegimeRules::new(RegimeChoice::Automatic, 1e-3), true), (RegimeRules::new(RegimeChoice::Events, 1e-3), false)]
+    {
+        let mut motion = Chosen::new(&ball(0.98), rules, &[1.1], &[0.0]);
+        let (q, p) = motion.run(time);
+        // The ball of radius 0.1 m lies on the floor.
+        assert!((q[0] - 0.1).abs() < 1e-11, "{q:?}");
+        assert!(p[0].abs() < 1e-9, "{p:?}");
+        let statistics = *motion.motion.statistics();
+        assert!((statistics.time[0] + statistics.time[1] - time).abs() < 1e-9, "{statistics:?}");
+        let changes = &motion.changes.0;
+        assert_eq!(changes.len() as u64, statistics.changes);
+        if crowded {
+            let [first, .., last] = &changes[..] else { panic!("{changes:?}") };
+            assert!(matches!(first.reason, RegimeReason::ManyEvents(100)), "{changes:?}");
+            assert!(first.regime == Regime::TimeSteps && last.regime == Regime::Events, "{changes:?}");
+            assert!(last.reason == RegimeReason::Quiet, "{changes:?}");
+            // Steps of 1 ms leave a bounce out that is lower than what the ball falls in a few of them.
+            assert!(statistics.closed < 1e-4, "{statistics:?}");
+        } else {
+            assert!(changes.is_empty(), "{changes:?}");
+        }
+    }
+}
+
+#[test]
+fn what_events_cannot_resolve_is_stepped_over() {
+    let rules = RegimeRules::new(RegimeChoice::Automatic, 1e-3);
+    let start = [0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0];
+    let mut motion = Chosen::new(&free_box(0.5, 0.0), rules, &start, &[0.3, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    // Four corners land at once, and the solver of the motion by events may do nothing about them.
+    motion.motion.events.rules.effort = ContactEffort::ToTolerance { tolerance: 1e-12, rounds: 0 };
+    let (q, _) = motion.run(1.0);
+    let [change] = &motion.changes.0[..] else { panic!("{:?}", motion.changes.0) };
+    assert!(matches!(change.reason, RegimeReason::Failed(HybridError::Contact { .. })), "{change:?}");
+    // It falls by 0.2 m. Friction in the impact at 2 m/s could take 1 m/s: it slides no more. Each to a time step's motion.
+    let landing = (2.0 * 0.2 / 9.81_f64).sqrt();
+    assert!(change.time < landing && landing - change.time < 0.1, "{change:?}");
+    assert!((q[2] - 0.1).abs() < 3e-3, "{q:?}");
+    assert!((q[0] - 0.3 * landing).abs() < 1e-3, "{q:?}");
+}
+
+#[test]
+fn only_time_steps() {
+    let (hopper, start) = shipped(include_str!("../../../models/contacts/hopper.toml"));
+    let mut stepped = Stepped::new(&hopper, &start, &[0.0, 0.0]);
+    // Sums of these times are exact.
+    let h = 1.0 / 1024.0;
+    (0..1024).for_each(|_| stepped.step(h));
+    let rules = RegimeRules::new(RegimeChoice::TimeSteps, h);
+    let mut motion = Chosen::new(&hopper, rules, &start, &[0.0, 0.0]);
+    let (q, p) = motion.run(stepped.t);
+    assert_eq!((q, p), (stepped.q, stepped.p));
+    assert_eq!(motion.motion.statistics().time, [0.0, stepped.t]);
 }

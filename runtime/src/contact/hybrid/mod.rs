@@ -8,7 +8,7 @@ mod watch;
 use super::instant::Touches;
 #[cfg(doc)]
 use super::Way;
-use super::{Certificate, ContactError, Effort, Impact, ImpactOrder, Mode, Touching, WithContacts};
+use super::{Certificate, ContactError, Effort, Impact, ImpactOrder, Mode, RegimeChange, Touching, WithContacts};
 use crate::error::StepError;
 use crate::integrate::{Limits, Solver, Statistics, Step, Stepper};
 use crate::system::Real;
@@ -214,6 +214,9 @@ pub trait ContactObserver<Y: Touching> {
 
     /// Called for every event, after it was resolved.
     fn event(&mut self, _system: &mut WithContacts<Y>, _event: &ContactEvent<Y::Scalar>) {}
+
+    /// Called where a [`ContactMotion`](super::ContactMotion) changes between events and time steps.
+    fn regime(&mut self, _system: &mut WithContacts<Y>, _change: &RegimeChange) {}
 }
 
 impl<Y: Touching> ContactObserver<Y> for () {}
@@ -344,6 +347,11 @@ where
     /// The state.
     pub fn state(&mut self, system: &WithContacts<Y>, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
         self.solver.state(system, q, p);
+    }
+
+    /// The state where the last step began, or the event before it.
+    pub(super) fn before_step(&self) -> &(Y::Scalar, Y::Coordinates, Y::Momenta) {
+        &self.start
     }
 
     /// Work of the integration so far.
