@@ -161,6 +161,11 @@ impl<S: Scalar> Closure<S> {
             )
     }
 
+    /// Whether all rows turn with the first body, and change in no other way.
+    pub(super) fn turns_with_first(&self) -> bool {
+        matches!(self, Closure::PointOnLine | Closure::PointOnPlane | Closure::RollingBall { .. })
+    }
+
     /// Rows that are constants, by components.
     fn components(&self) -> &'static [usize] {
         match self {
@@ -286,6 +291,10 @@ impl<S: Scalar> Closure<S> {
     pub(super) fn direction_rates(&self, at: &Relative<S>, rel: &Motion<S>) -> [Force<S>; 6] {
         if self.constant() {
             return [Force::zero(); 6];
+        }
+        if self.turns_with_first() {
+            let turned = |e: Force<S>| Force { lin: cross(e.lin, rel.ang), ang: cross(e.ang, rel.ang) };
+            return self.directions(at).map(turned);
         }
         let rate = |f: Force<Dual<S>>| Force { lin: f.lin.map(|x| x.du), ang: f.ang.map(|x| x.du) };
         self.map(&|x| Dual::new(x, S::zero())).directions(&at.moving(rel)).map(rate)

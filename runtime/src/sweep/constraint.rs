@@ -318,17 +318,25 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             self.trace.at(None, Quantity::Constraint);
             let at = w.constraints.relative[index];
             let [a, b] = [&cut.a, &cut.b].map(|frame| self.frame_motion(frame, w));
-            let rates = cut.closure.direction_rates(&at, &difference(&b, &at.motion(&a)));
-            let mut total = Force::zero();
+            let first = at.motion(&a);
             let mut own = Force::zero();
-            for (k, r) in constraint.range().enumerate() {
-                let sigma = w.constraints.multipliers[r];
-                own = own.plus(&w.constraints.rows[r].e.times(sigma));
-                total = total.plus(&rates[k].times(sigma));
+            for r in constraint.range() {
+                own = own.plus(&w.constraints.rows[r].e.times(w.constraints.multipliers[r]));
             }
-            if cut.b.node.is_some() {
-                total = total.plus(&b.cross_force(&own));
-            }
+            let total = if cut.closure.turns_with_first() {
+                // Ė_c = −(Ω_C − Ω_A) × E_c for the angular velocities: only the turning of the first body is left.
+                Motion { lin: b.lin, ang: first.ang }.cross_force(&own)
+            } else {
+                let rates = cut.closure.direction_rates(&at, &difference(&b, &first));
+                let turning = constraint
+                    .range()
+                    .zip(rates)
+                    .fold(Force::zero(), |sum, (r, rate)| sum.plus(&rate.times(w.constraints.multipliers[r])));
+                match cut.b.node.is_some() {
+                    true => turning.plus(&b.cross_force(&own)),
+                    false => turning,
+                }
+            };
             let ends = self.at_nodes(cut, &at, &total, &w.poses);
             let forces = &mut w.constraints.forces;
             self.along_loop(cut, ends, &w.poses, |v, f| forces[v] = forces[v] + f);
