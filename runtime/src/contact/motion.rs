@@ -217,7 +217,8 @@ where
         self.steps.statistics()
     }
 
-    /// Goes on until `t_end` (s) is reached exactly.
+    /// Goes on until `t_end` (s) is reached exactly, by at most as many steps and events as the limits of
+    /// [`ContactMotion::events`] say.
     ///
     /// # Errors
     /// [`HybridError`]; the state is then that of the last step or event.
@@ -233,7 +234,13 @@ where
             self.statistics.time[0] += (self.events.time() - begin).to_f64();
             return result;
         }
+        let steps = self.events.limits_mut().steps;
+        let mut left = steps;
         while self.time() < t_end {
+            if left == 0 {
+                return Err(StepError::TooManySteps { time: self.time().to_f64(), steps }.into());
+            }
+            left -= 1;
             self.advance(system, t_end, observer)?;
         }
         Ok(())
