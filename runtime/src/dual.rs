@@ -102,6 +102,9 @@ impl<S: Real> Real for Dual<S> {
     fn epsilon() -> f64 {
         S::epsilon()
     }
+    fn derivative(self) -> Option<f64> {
+        Some(self.du.to_f64())
+    }
 }
 
 #[cfg(test)]

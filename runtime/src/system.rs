@@ -14,6 +14,11 @@ pub trait Real: Scalar + PartialOrd + core::fmt::Debug {
     fn from_index(index: usize) -> Self {
         Self::constant(index as f64)
     }
+    /// Its derivative, rounded to a double; `None` for number types that carry none. Iterations that stop where a value is
+    /// found ask, because a derivative takes one more step.
+    fn derivative(self) -> Option<f64> {
+        None
+    }
     /// The count that a number is: the inverse of [`Real::from_index`].
     fn index(self) -> usize {
         self.to_f64() as usize

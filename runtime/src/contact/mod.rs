@@ -15,7 +15,10 @@ mod stepping;
 mod touching;
 mod with_contacts;
 
-pub use hybrid::{Cause, ContactEvent, ContactObserver, ContactRules, ContactStatistics, Hybrid, HybridError, Stretch};
+pub use hybrid::{
+    Cause, ContactEvent, ContactObserver, ContactRules, ContactStatistics, Hybrid, HybridError, SaltationError,
+    Stretch, Tangent,
+};
 #[cfg(feature = "alloc")]
 pub use mode_table::{ContactInterpreter, ModeTable, Reducible};
 pub use motion::{ContactMotion, Regime, RegimeChange, RegimeChoice, RegimeReason, RegimeRules, RegimeStatistics};

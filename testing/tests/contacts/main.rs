@@ -4,6 +4,7 @@ mod answers;
 mod edges;
 mod known;
 mod round;
+mod saltation;
 mod scene;
 mod solid;
 mod stepping;

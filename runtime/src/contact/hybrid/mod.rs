@@ -2,8 +2,11 @@
 
 mod land;
 mod resolve;
+mod saltation;
 mod select;
 mod watch;
+
+pub use saltation::{SaltationError, Tangent};
 
 use super::instant::Touches;
 #[cfg(doc)]

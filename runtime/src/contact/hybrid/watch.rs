@@ -325,7 +325,7 @@ impl<Y: Touching> WithContacts<Y> {
     }
 
     /// The functions of contact `k`, after [`WithContacts::look`] and, if it is closed, [`WithContacts::loads`].
-    fn watched(&self, k: usize) -> Watched<Y::Scalar> {
+    pub(super) fn watched(&self, k: usize) -> Watched<Y::Scalar> {
         let zero = Y::Scalar::zero();
         let c = self.contact(k);
         let [normal, x, y] = self.at.forces.as_ref()[k];

@@ -3,10 +3,20 @@
 use super::{Problem, Terms, Touch};
 use crate::system::Real;
 
+/// Length of a vector; at the origin, where it has no derivative, that of numbers with derivatives is zero.
+pub(super) fn length<S: Real>([x, y]: [S; 2]) -> S {
+    let square = x * x + y * y;
+    if square > S::zero() {
+        square.sqrt()
+    } else {
+        square
+    }
+}
+
 /// The disc of a radius: the nearest point in it.
 pub(super) fn disc<S: Real>([x, y]: [S; 2], radius: S) -> [S; 2] {
-    let t = (x * x + y * y).sqrt();
-    if t <= radius {
+    let t = length([x, y]);
+    if t <= radius || t == S::zero() {
         [x, y]
     } else {
         [radius / t * x, radius / t * y]

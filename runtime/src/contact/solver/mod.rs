@@ -104,6 +104,9 @@ pub enum ContactError {
         /// Collisions.
         collisions: u32,
     },
+    /// The impulses of a collision whose slip turns are solutions of differential equations, whose derivatives are not
+    /// computed. Numbers with derivatives only.
+    NoDerivative,
     /// A velocity or an inertia is not finite.
     NotFinite,
 }
@@ -123,6 +126,9 @@ impl core::fmt::Display for ContactError {
                 f,
                 "contacts that collide one after the other did not come to an end in {collisions} collisions: solve them simultaneously"
             ),
+            ContactError::NoDerivative => {
+                write!(f, "the slip of a collision with restitution and friction turns: derivatives of its impulse are not computed")
+            }
             ContactError::NotFinite => write!(f, "a velocity or an inertia of a contact is not finite"),
         }
     }
@@ -199,7 +205,29 @@ struct Progress<S> {
 }
 
 /// [`solve`] with normal impulses not below `least`.
+///
+/// On numbers with derivatives, the iteration stops where the values are found, before the derivatives are. These follow
+/// from steps of Newton's method at the solution, in which only derivatives are left to change: the theorem of implicit
+/// functions on the rows that act.
 fn solve_above<S: Real>(
+    problem: &Problem<S>,
+    least: &[S],
+    effort: Effort,
+    impulses: &mut [S],
+    work: &mut [S],
+) -> Result<Certificate<S>, ContactError> {
+    let certificate = iterate(problem, least, effort, impulses, work)?;
+    if S::zero().derivative().is_some() {
+        let terms = Terms { problem, least, alpha: S::zero(), anchor: &[] };
+        if !newton::differentiate(&terms, impulses, work) {
+            return Err(ContactError::NotFinite);
+        }
+    }
+    Ok(certificate)
+}
+
+/// The impulses of [`solve_above`] by iteration.
+fn iterate<S: Real>(
     problem: &Problem<S>,
     least: &[S],
     effort: Effort,

@@ -39,6 +39,25 @@ pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], residual: S, w
     false
 }
 
+/// Derivatives of impulses whose values are a solution: full steps, the second of which takes away what the small addition
+/// to the diagonal leaves. `false` where the equations are singular.
+pub(super) fn differentiate<S: Real>(terms: &Terms<S>, impulses: &mut [S], work: &mut [S]) -> bool {
+    let n = impulses.len();
+    let (matrix, rest) = work.split_at_mut(n * n);
+    let step = &mut rest[..n];
+    (0..2).all(|_| {
+        matrix.fill(S::zero());
+        for touch in terms.problem.touches {
+            equations(terms, touch, impulses, matrix, step);
+        }
+        let solved = eliminate(matrix, step);
+        for (p, step) in impulses.iter_mut().zip(step.iter()) {
+            *p = *p - *step;
+        }
+        solved
+    })
+}
+
 /// The equations of a contact, `F(P) = 0`, in `step`, and their derivatives in its rows of `matrix`.
 fn equations<S: Real>(terms: &Terms<S>, touch: &Touch<S>, impulses: &[S], matrix: &mut [S], step: &mut [S]) {
     let (zero, one) = (S::zero(), S::one());
@@ -73,7 +92,7 @@ fn equations<S: Real>(terms: &Terms<S>, touch: &Touch<S>, impulses: &[S], matrix
     let held = if pressed { normal } else { least };
     let radius = friction * held;
     let z: [S; 2] = core::array::from_fn(|i| x[i] - mass * u[i]);
-    let size = (z[0] * z[0] + z[1] * z[1]).sqrt();
+    let size = cone::length(z);
     for i in 0..2 {
         let at = (row + 1 + i) * n;
         let sticks = size <= radius;

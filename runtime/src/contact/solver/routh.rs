@@ -14,6 +14,8 @@ use crate::system::{LieJoint, Real, System};
 
 /// Part of the inverse inertia below which the direction of slip counts as constant.
 const STRAIGHT: f64 = 1e-13;
+/// Derivative of the rate at which the direction of slip turns, below which it is rounding.
+const TURNS: f64 = 1e-9;
 /// Part of the first speed at which slip has come to rest.
 const STILL: f64 = 1e-15;
 /// Error allowed in a step of a turning slip, with velocities and inverse inertia of size one.
@@ -100,13 +102,16 @@ impl<S: Real> Process<S> {
             if !(end.left(self.v[0], self.p[0], self.work) < S::zero()) {
                 return Ok(());
             }
-            let slides = self.slip();
+            let slides = self.slip()?;
             let force = match slides {
                 Some([x, y]) => [S::one(), -(self.friction * x), -(self.friction * y)],
                 None => self.hold(),
             };
             let rate = self.rate(force);
             let across = slides.map_or(S::zero(), |[x, y]| x * rate[2] - y * rate[1]);
+            if across.derivative().is_some_and(|d| !(d.abs() <= TURNS)) {
+                return Err(ContactError::NoDerivative);
+            }
             if across.to_f64().abs() > STRAIGHT.max(8.0 * S::epsilon()) && self.moves() {
                 self.turn(end)?;
             } else {
@@ -127,21 +132,28 @@ impl<S: Real> Process<S> {
     }
 
     /// Direction of slip: of the motion, or of the motion that begins where the cone cannot hold it.
-    fn slip(&self) -> Option<[S; 2]> {
+    fn slip(&self) -> Result<Option<[S; 2]>, ContactError> {
         let [_, x, y] = self.v;
         let speed = (x * x + y * y).sqrt();
         if speed > S::zero() {
-            return Some([x / speed, y / speed]);
+            return Ok(Some([x / speed, y / speed]));
         }
         let [_, x, y] = self.hold();
         if x * x + y * y <= self.friction * self.friction {
-            return None;
+            return Ok(None);
         }
         let friction = self.friction;
-        local::direction(|[a, b]| {
+        let velocity = |[a, b]: [S; 2]| {
             let [_, x, y] = self.rate([S::one(), -(friction * a), -(friction * b)]);
             (a * y - b * x, a * x + b * y)
-        })
+        };
+        let found = local::direction(velocity);
+        // The search gives the direction without a derivative, which it has not in a plane.
+        let turns = |t| velocity(t).0.derivative().is_some_and(|d| !(d.abs() <= TURNS));
+        match found.is_some_and(turns) {
+            true => Err(ContactError::NoDerivative),
+            false => Ok(found),
+        }
     }
 
     /// The force that keeps the bodies from slipping, for each unit of the normal impulse.
@@ -205,6 +217,9 @@ impl<S: Real> Process<S> {
     /// A piece in which the direction of slip turns, to the end or to where slip comes to rest.
     fn turn(&mut self, end: End<S>) -> Result<(), ContactError> {
         let zero = S::zero();
+        if zero.derivative().is_some() {
+            return Err(ContactError::NoDerivative);
+        }
         let [_, x, y] = self.v;
         let speed = (x * x + y * y).sqrt();
         let mut keller = Keller { w: self.w, friction: self.friction, start: [x / speed, y / speed] };
