@@ -109,13 +109,13 @@ fn pair([a, b]: [Solid; 2], names: [&str; 2]) -> Model {
     model(&format!("name = \"pair\"\n{}{}{}{}{contact}", body("a"), body("b"), a.text("a"), b.text("b")))
 }
 
-fn turned(q: &[f64], x: Vec3<f64>) -> Vec3<f64> {
+pub(super) fn turned(q: &[f64], x: Vec3<f64>) -> Vec3<f64> {
     let (u, w) = ([q[3], q[4], q[5]], q[6]);
     let t = scale3(2.0, cross(u, x));
     add3(x, add3(scale3(w, t), cross(u, t)))
 }
 
-fn back(q: &[f64], x: Vec3<f64>) -> Vec3<f64> {
+pub(super) fn back(q: &[f64], x: Vec3<f64>) -> Vec3<f64> {
     turned(&[0.0, 0.0, 0.0, -q[3], -q[4], -q[5], q[6]], x)
 }
 
