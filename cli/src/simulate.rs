@@ -67,7 +67,8 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
             let assembly = loops::assemble(path, &plan, &mut interpreter, &q)?;
             loops::tell(path, &plan, &assembly);
             q.clone_from(&assembly.q);
-            v = loops::velocities(&plan, &mut interpreter, &q, &v, args.v.is_some())?;
+            let stated = args.v.is_some() || plan.start_velocity().is_some();
+            v = loops::velocities(&plan, &mut interpreter, &q, &v, stated)?;
             Some(assembly)
         }
     };
@@ -389,7 +390,8 @@ fn start(plan: &Plan, args: &SimulateArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
     let names = plan.coordinate_names();
     let mut q = list("q", &args.q, names.clone(), default_start(plan))?;
     let speed = if plan.model.contacts.is_empty() { 0.1 } else { 0.0 };
-    let v = list("v", &args.v, plan.velocity_names(), vec![speed; plan.dims.nv])?;
+    let default = plan.start_velocity().unwrap_or_else(|| vec![speed; plan.dims.nv]);
+    let v = list("v", &args.v, plan.velocity_names(), default)?;
     let interpreter: Interpreter<f64> = plan.default_interpreter();
     for at in interpreter.quaternions() {
         let norm = q[at..at + 4].iter().fold(0.0_f64, |n, x| n.hypot(*x));

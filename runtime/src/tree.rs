@@ -278,6 +278,12 @@ pub enum Closure<S> {
         /// Radius, m.
         radius: S,
     },
+    /// An ellipsoid about the second origin, with its axes along those of the second frame, rolls on the plane across z of
+    /// the first.
+    RollingEllipsoid {
+        /// Semi-axes along x, y and z, m.
+        semi_axes: [S; 3],
+    },
     /// A ball about the second origin rolls on a ball about the first.
     RollingBalls {
         /// Radii of the first and the second, m.

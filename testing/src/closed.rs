@@ -32,7 +32,7 @@ pub struct LoopKnobs {
     /// Probability that a constraint couples joints.
     pub coupling: f64,
     /// Weights of the kinds of loops, in the order of [`LoopKind`].
-    pub kinds: [f64; 20],
+    pub kinds: [f64; 21],
     /// Probability that a constraint has a `decay`.
     pub decay: f64,
     /// Probability that a loop may leave its joints no motion.
@@ -49,7 +49,7 @@ impl LoopKnobs {
             ground: 0.6,
             twice: 0.0,
             coupling: 0.1,
-            kinds: [1.0; 20],
+            kinds: [1.0; 21],
             decay: 0.0,
             locked: 0.0,
         }
@@ -68,8 +68,8 @@ impl LoopKnobs {
             tree.massless = 0.0;
         }
         let few = rng.chance(0.4);
-        let kinds: [f64; 20] = std::array::from_fn(|_| if few && rng.chance(0.7) { 0.0 } else { 1.0 });
-        let kinds = if kinds.iter().all(|w| *w == 0.0) { [1.0; 20] } else { kinds };
+        let kinds: [f64; 21] = std::array::from_fn(|_| if few && rng.chance(0.7) { 0.0 } else { 1.0 });
+        let kinds = if kinds.iter().all(|w| *w == 0.0) { [1.0; 21] } else { kinds };
         LoopKnobs {
             tree,
             planar,
@@ -389,6 +389,10 @@ impl Closer<'_> {
                 LoopKind::RollingBallOnCylinder { axis, length: self.value(length), radii }
             }
             18 => LoopKind::KnifeEdge { axis: self.sideways() },
+            19 => {
+                let semi_axes = [0.4, 0.6, 0.9].map(|part| self.value(part * length));
+                LoopKind::RollingEllipsoid { normal: self.sideways(), semi_axes }
+            }
             _ => {
                 let row: [f64; 6] = std::array::from_fn(|_| self.rng.around(1.0));
                 LoopKind::Pfaffian { row: row.map(|x| self.value(x)) }
@@ -442,6 +446,14 @@ impl Closer<'_> {
             },
             LoopKind::RollingBall { normal, radius } => {
                 (self.any_turn(), add3(along(normal, num(radius)), level(self, normal)))
+            }
+            LoopKind::RollingEllipsoid { normal, semi_axes } => {
+                let turn = self.any_turn();
+                // The extent along the normal, from the normal's components in the second frame.
+                let n = unit(normal);
+                let height = (0..3).map(|k| num(semi_axes[k]) * (0..3).map(|i| turn[i][k] * n[i]).sum::<f64>());
+                let height = height.map(|x| x * x).sum::<f64>().sqrt();
+                (turn, add3(along(normal, height), level(self, normal)))
             }
             LoopKind::RollingBalls { radii: [a, b] } => (self.any_turn(), along(self.sideways(), num(a) + num(b))),
             LoopKind::RollingCapsules { axes: [a, b], lengths, radii } => loop {

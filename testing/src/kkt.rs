@@ -133,6 +133,10 @@ pub fn residuals<S: Real>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose
             vec![along(unit(normal)) - num(radius) * (S::one() - tilt * tilt).sqrt()]
         }
         LoopKind::RollingBall { normal, radius } => vec![along(unit(normal)) - num(radius)],
+        LoopKind::RollingEllipsoid { normal, semi_axes } => {
+            let height = length(lowest(b, a.direction(unit(normal)), semi_axes.map(num)).1);
+            vec![along(unit(normal)) - height]
+        }
         LoopKind::RollingBalls { radii: [p, q] } => vec![length(d) - num(p) - num(q)],
         LoopKind::RollingCapsules { .. }
         | LoopKind::RollingBallOnBox { .. }
@@ -197,6 +201,10 @@ pub fn rates<S: Real>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S>)
             let arm = scale3(-num(radius), a.direction(unit(normal)));
             contact(a, normal, add3(v, cross(w, arm)))
         }
+        LoopKind::RollingEllipsoid { normal, semi_axes } => {
+            let (arm, _) = lowest(b, a.direction(unit(normal)), semi_axes.map(num));
+            contact(a, normal, add3(v, cross(w, arm)))
+        }
         LoopKind::RollingBalls { radii: [p, q] } => {
             // The contact point divides the line between the middles as the radii do.
             let share = num(q) / (num(p) + num(q));
@@ -216,6 +224,17 @@ pub fn rates<S: Real>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S>)
             vec![dot3(b.turn([x, y, z]), v) + dot3(b.turn([p, q, r]), w)]
         }
     }
+}
+
+/// The point of an ellipsoid about the origin of `b` that is lowest along `n`, from that origin, and a vector as long as the
+/// ellipsoid reaches along `n`. The ellipsoid is the unit ball, stretched along its axes; that vector, scaled to unit
+/// length, is the point of the ball, in the axes of the ellipsoid, that becomes the highest one.
+fn lowest<S: Real>(b: &Pose<S>, n: Vec3<S>, semi_axes: [S; 3]) -> (Vec3<S>, Vec3<S>) {
+    let axis = |k: usize| b.direction(std::array::from_fn(|i| f64::from(u8::from(i == k))));
+    let on_ball: Vec3<S> = std::array::from_fn(|k| semi_axes[k] * dot3(n, axis(k)));
+    let extent = dot3(on_ball, on_ball).sqrt();
+    let stretched = (0..3).map(|k| scale3(-(semi_axes[k] * on_ball[k]) / extent, axis(k)));
+    (stretched.fold([S::zero(); 3], add3), on_ball)
 }
 
 /// The nearest points of the parts of two bodies that balls of some radii pass along, m; `None` for other kinds.

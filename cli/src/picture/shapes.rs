@@ -107,6 +107,12 @@ impl Shapes {
             match *kind {
                 LoopKind::RollingDisc { axis, radius, .. } => discs.push((second, axis, number(radius))),
                 LoopKind::RollingBall { radius, .. } => discs.push((second, [0.0, 1.0, 0.0], number(radius))),
+                LoopKind::RollingEllipsoid { semi_axes, .. } => {
+                    // The ellipse in the plane of x and z.
+                    let [x, y, z] = semi_axes.map(number);
+                    let widest = x.max(y).max(z);
+                    discs.push((second, [0.0, 1.0, 0.0], widest));
+                }
                 LoopKind::RollingBalls { radii } | LoopKind::RollingCapsules { radii, .. } => {
                     discs.extend([first, second].into_iter().zip(radii).map(|(m, r)| (m, [0.0, 1.0, 0.0], number(r))));
                 }

@@ -7,6 +7,7 @@ use mbd_runtime::contact::RestitutionLaw;
 use super::elementary::{elementary, moved, Elementary, SUPPORTED};
 use super::loops::{led, merged};
 use super::numbers::{Numbers, Quantity};
+use super::shapes::a as with_article;
 use crate::import::raw::{RawContact, RawModel, RawNumber, RawSurface};
 use crate::import::source::{Findings, Span, Spanned};
 use crate::import::words::{did_you_mean, list, quote};
@@ -225,7 +226,7 @@ impl Pair {
 
 fn unsupported(pair: &Pair, [a, b]: [&Shape; 2], findings: &mut Findings) {
     let what = format!("contact {}", quote(&pair.name.value));
-    let message = format!("{what}: a {} and a {} cannot touch", a.kind.word(), b.kind.word());
+    let message = format!("{what}: {} and {} cannot touch", with_article(a.kind.word()), with_article(b.kind.word()));
     let simple = |s: &Shape| matches!(s.kind, ShapeKind::Plane { .. } | ShapeKind::Point);
     let help = match simple(a) || simple(b) {
         true => SUPPORTED.into(),

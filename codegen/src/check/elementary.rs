@@ -5,7 +5,8 @@ use crate::model::{LoopKind, Mount, Placement, ShapeKind, Value};
 
 /// What [`elementary`] has, for messages.
 pub(super) const SUPPORTED: &str =
-    "a `plane`, `sphere` or `point` can touch shapes of every other kind, a `sphere` or `capsule` also one of its own";
+    "a `plane` can touch shapes of every other kind, a `sphere` or `point` those but an \
+     `ellipsoid`, a `sphere` or `capsule` also one of its own";
 
 /// One place where two shapes can touch: a loop between two frames, which stand at these origins in the axes of the
 /// shapes, not turned.
@@ -36,6 +37,9 @@ pub(super) fn elementary(first: &ShapeKind, second: &ShapeKind) -> Option<Vec<El
         (ShapeKind::Plane { normal }, ShapeKind::Cylinder { radius, length }) => {
             let kind = LoopKind::RollingDisc { normal, axis: Z, radius: Value::Const(radius) };
             ends(length).into_iter().map(|at| Elementary { kind, first: MIDDLE, second: at }).collect()
+        }
+        (ShapeKind::Plane { normal }, ShapeKind::Ellipsoid { semi_axes }) => {
+            vec![middles(LoopKind::RollingEllipsoid { normal, semi_axes: semi_axes.map(Value::Const) })]
         }
         (ShapeKind::Sphere { radius: first }, second) => vec![balls(first, ball_of(&second)?)],
         (ShapeKind::Capsule { radius: first, length }, ShapeKind::Capsule { radius: second, length: other }) => {
@@ -144,6 +148,7 @@ mod tests {
         assert_eq!(count(ShapeKind::Box { size: [1.0; 3] }), Some(8));
         assert_eq!(count(ShapeKind::Cylinder { radius, length }), Some(2));
         assert_eq!(count(ShapeKind::Cylinder { radius, length: 0.0 }), Some(1));
+        assert_eq!(count(ShapeKind::Ellipsoid { semi_axes: [0.1, 0.2, 0.3] }), Some(1));
         assert_eq!(count(plane), None);
         let sphere = ShapeKind::Sphere { radius };
         let wide = ShapeKind::Sphere { radius: 0.3 };
@@ -163,11 +168,13 @@ mod tests {
             ShapeKind::Capsule { radius, length },
             ShapeKind::Box { size: [1.0; 3] },
             ShapeKind::Cylinder { radius, length },
+            ShapeKind::Ellipsoid { semi_axes: [0.1, 0.2, 0.3] },
         ];
         for (i, a) in shapes.iter().enumerate() {
             for (j, b) in shapes.iter().enumerate() {
                 let found = elementary(a, b).or_else(|| elementary(b, a)).is_some();
-                let wanted = if i == j { i == 1 || i == 3 } else { i.min(j) <= 2 };
+                let least = i.min(j);
+                let wanted = if i == j { i == 1 || i == 3 } else { least == 0 || (least <= 2 && i.max(j) < 6) };
                 assert_eq!(found, wanted, "{} and {}", a.word(), b.word());
             }
         }

@@ -105,6 +105,7 @@ fn example(key: &str, kind: &LoopSpec) -> Option<&'static str> {
         "length" => Some("`length = ..`, that of the cylinder in metres"),
         "lengths" => Some("`lengths = [first, second]`, in metres; 0 makes a ball"),
         "size" => Some("`size = [x, y, z]`, the lengths of its edges in metres"),
+        "semi_axes" => Some("`semi_axes = [x, y, z]`, in metres"),
         "radius" => Some("`radius = ..`, in metres"),
         "radii" => Some("`radii = [first, second]`, in metres"),
         "row" => Some("`row = [vx, vy, vz, wx, wy, wz]`, the factors of velocity and angular velocity"),
@@ -145,7 +146,7 @@ fn number(raw: Option<&RawNumber>, key: &str, kind: &LoopSpec, what: &str, numbe
     match key {
         "pitch" => pitch(raw, what, numbers),
         "lengths" => not_negative(raw, key, "a length in metres; 0 makes a ball", what, numbers),
-        "size" => positive(raw, key, "lengths in metres, greater than 0", what, numbers),
+        "size" | "semi_axes" => positive(raw, key, "lengths in metres, greater than 0", what, numbers),
         "length" if !kind.directions.is_empty() => {
             positive(raw, key, "a length in metres, greater than 0", what, numbers)
         }

@@ -32,11 +32,12 @@ fn shape(raw: &RawShape, names: &Names, numbers: &mut Numbers) -> Option<Shape> 
 
 /// Reports dimensions that are superfluous or missing.
 fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) {
-    let word = spec.word();
+    let word = a(spec.word());
     let given = [
         ("radius", raw.radius.as_ref().map(|x| x.span), "`radius = ..`, in metres"),
         ("length", raw.length.as_ref().map(|x| x.span), "`length = ..`, along its z axis in metres"),
         ("size", raw.size.as_ref().map(|x| x.span), "`size = [x, y, z]`, the lengths of its edges in metres"),
+        ("semi_axes", raw.semi_axes.as_ref().map(|x| x.span), "`semi_axes = [x, y, z]`, in metres"),
         ("normal", raw.normal.as_ref().map(|x| x.span), ""),
     ];
     for (key, span, example) in given {
@@ -45,16 +46,22 @@ fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) 
                 let takers = SHAPES.iter().filter(|s| s.keys.contains(&key)).map(|s| quote(s.word()));
                 let takers = takers.collect::<Vec<_>>().join(" or ");
                 let help = format!("remove it, or make the shape {takers}");
-                numbers.findings.error(span, format!("{what}: a {word} has no `{key}`"), help);
+                numbers.findings.error(span, format!("{what}: {word} has no `{key}`"), help);
             }
             // A plane without a normal is across z.
             (None, true) if key != "normal" => {
-                let message = format!("{what}: a {word} needs a `{key}`");
+                let message = format!("{what}: {word} needs `{key}`");
                 numbers.findings.error(raw.name.span, message, format!("add {example}"));
             }
             _ => {}
         }
     }
+}
+
+/// A word of a shape with its article.
+pub(super) fn a(word: &str) -> String {
+    let article = if word.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+    format!("{article} {word}")
 }
 
 fn kind(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) -> Option<ShapeKind> {
@@ -76,6 +83,11 @@ fn kind(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) -> 
             let edges = raw.size.as_ref()?;
             Some(ShapeKind::Box { size: [0, 1, 2].map(|k| size(&edges.value[k], "size", MORE, what, numbers)) })
         }
+        "ellipsoid" => {
+            let axes = raw.semi_axes.as_ref()?;
+            let semi_axes = [0, 1, 2].map(|k| size(&axes.value[k], "semi_axes", MORE, what, numbers));
+            Some(ShapeKind::Ellipsoid { semi_axes })
+        }
         _ => {
             let normal = raw.normal.as_ref().map(|n| numbers.direction(n, &format!("{what}: `normal`")));
             Some(ShapeKind::Plane { normal: normal.unwrap_or(Some([0.0, 0.0, 1.0]))? })
@@ -96,10 +108,13 @@ fn size(x: &RawNumber, key: &str, help: &str, what: &str, numbers: &mut Numbers)
     value
 }
 
-/// Corners and ends are places that are known when the code is generated; only a point, a sphere or a plane can be moved
-/// by a parameter.
+/// Corners and ends are places that are known when the code is generated; only a point, a sphere, an ellipsoid or a
+/// plane, which are their origins with a size, can be moved by a parameter.
 fn still(raw: &RawShape, shape: &Shape, what: &str, numbers: &mut Numbers) {
-    if matches!(shape.kind, ShapeKind::Point | ShapeKind::Sphere { .. } | ShapeKind::Plane { .. }) {
+    if matches!(
+        shape.kind,
+        ShapeKind::Point | ShapeKind::Sphere { .. } | ShapeKind::Plane { .. } | ShapeKind::Ellipsoid { .. }
+    ) {
         return;
     }
     let rotation = match shape.mount.placement.rotation {
@@ -108,7 +123,7 @@ fn still(raw: &RawShape, shape: &Shape, what: &str, numbers: &mut Numbers) {
     };
     if shape.mount.placement.xyz.iter().chain(&rotation).any(|v| matches!(v, Value::Param(_))) {
         let span: Span = raw.placement.xyz.as_ref().map_or(raw.name.span, |xyz| xyz.span);
-        let message = format!("{what}: the place of a {} cannot depend on a parameter", shape.kind.word());
+        let message = format!("{what}: the place of {} cannot depend on a parameter", a(shape.kind.word()));
         numbers.findings.error(span, message, "write constants, or use spheres or points, which may be moved");
     }
 }

@@ -26,8 +26,12 @@ pub(super) fn starts(raw: &RawModel, numbers: &mut Numbers) -> Vec<Start> {
             Some(start) => coordinates_of(start, kind, &what, numbers),
             None => kind.neutral(),
         };
-        if joint.start.is_some() || held {
-            starts.push(Start { joint: index, q, held });
+        let v = match &joint.start_velocity {
+            Some(velocity) => velocities_of(velocity, kind, &what, numbers),
+            None => vec![0.0; kind.nv()],
+        };
+        if joint.start.is_some() || joint.start_velocity.is_some() || held {
+            starts.push(Start { joint: index, q, v, held });
         }
     }
     starts
@@ -45,9 +49,10 @@ pub(super) fn placed(mut starts: Vec<Start>, place: &[usize]) -> Vec<Start> {
 /// Reports a start of coordinates that are not free, and says whether there was one.
 fn idle(joint: &RawJoint, what: &str, findings: &mut Findings) -> bool {
     let start = joint.start.as_ref().map(|s| ("start", span_of(s)));
+    let velocity = joint.start_velocity.as_ref().map(|v| ("start_velocity", span_of(v)));
     let held = joint.held.as_ref().map(|h| ("held", h.span));
     let mut found = false;
-    for (key, span) in start.into_iter().chain(held) {
+    for (key, span) in start.into_iter().chain(velocity).chain(held) {
         let (why, help) = if let Some(mimic) = &joint.mimic {
             let leader = quote(&mimic.leader.value);
             (format!("`{key}` on a joint that follows {leader}"), format!("move it to {leader}"))
@@ -65,16 +70,44 @@ fn idle(joint: &RawJoint, what: &str, findings: &mut Findings) -> bool {
     found
 }
 
-fn coordinates_of(start: &RawFreedoms, kind: &JointSpec, what: &str, numbers: &mut Numbers) -> Vec<f64> {
-    let each: &[RawNumber] = match start {
+/// The numbers under a key, alone or in a list.
+fn each(given: &RawFreedoms) -> &[RawNumber] {
+    match given {
         RawFreedoms::All(x) => std::slice::from_ref(x),
         RawFreedoms::Each(list) => &list.value,
+    }
+}
+
+fn velocities_of(given: &RawFreedoms, kind: &JointSpec, what: &str, numbers: &mut Numbers) -> Vec<f64> {
+    let number = |x| constant(x, Quantity::Plain, "start_velocity", what, numbers);
+    let v: Vec<f64> = each(given).iter().map(number).collect();
+    let wanted = kind.nv();
+    if v.len() == wanted {
+        return v;
+    }
+    let plural = |n: usize| if n == 1 { "" } else { "s" };
+    let message = format!(
+        "{what}: `start_velocity` has {} number{}, and a {} joint has {wanted} velocit{}",
+        v.len(),
+        plural(v.len()),
+        kind.word(),
+        if wanted == 1 { "y" } else { "ies" }
+    );
+    let names: Vec<&str> = kind.freedoms.iter().map(|freedom| freedom.name).collect();
+    let help = match wanted {
+        1 => "write one number".into(),
+        _ => format!("write them in this order: {}", names.join(", ")),
     };
+    numbers.findings.error(span_of(given), message, help);
+    vec![0.0; wanted]
+}
+
+fn coordinates_of(start: &RawFreedoms, kind: &JointSpec, what: &str, numbers: &mut Numbers) -> Vec<f64> {
     let wanted = quantities(kind);
-    let mut q: Vec<f64> = each
+    let mut q: Vec<f64> = each(start)
         .iter()
         .enumerate()
-        .map(|(k, x)| constant(x, wanted.get(k).copied().unwrap_or(Quantity::Plain), what, numbers))
+        .map(|(k, x)| constant(x, wanted.get(k).copied().unwrap_or(Quantity::Plain), "start", what, numbers))
         .collect();
     if q.len() != wanted.len() {
         // A joint without coordinates is told so already.
@@ -107,9 +140,9 @@ fn length(got: usize, n: usize, kind: &JointSpec, what: &str, span: Span, findin
 }
 
 /// A constant; NaN where there is none.
-fn constant(x: &RawNumber, quantity: Quantity, what: &str, numbers: &mut Numbers) -> f64 {
+fn constant(x: &RawNumber, quantity: Quantity, key: &str, what: &str, numbers: &mut Numbers) -> f64 {
     let help = "write a constant: the model begins there, whatever its parameters";
-    numbers.constant(x, quantity, &format!("{what}: `start`"), help)
+    numbers.constant(x, quantity, &format!("{what}: `{key}`"), help)
 }
 
 /// Scales a quaternion to unit length.

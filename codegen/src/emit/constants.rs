@@ -61,6 +61,10 @@ pub fn constants(input: &Input) -> Vec<Constant> {
     if !plan.model.starts.is_empty() {
         let start = Content::Floats(plan.start());
         constants.push(Constant::new("Coordinates that the model starts with.", "START", start));
+        if let Some(v) = plan.start_velocity() {
+            let doc = "Velocities that the model starts with.";
+            constants.push(Constant::new(doc, "START_VELOCITY", Content::Floats(v)));
+        }
         let doc = "Velocities of joints that stay where they start when loops are closed.";
         constants.push(Constant::new(doc, "HELD", Content::Flags(plan.held())));
     }

@@ -139,6 +139,8 @@ pub struct RawJoint {
     pub mimic: Option<RawMimic>,
     /// Coordinates from which loops are closed.
     pub start: Option<RawFreedoms>,
+    /// Velocities at the start.
+    pub start_velocity: Option<RawFreedoms>,
     /// Whether they do not change when loops are closed.
     pub held: Option<Spanned<bool>>,
     /// Stops.
@@ -182,6 +184,7 @@ impl RawJoint {
             motion: RawMotion::Free,
             mimic: None,
             start: None,
+            start_velocity: None,
             held: None,
             limits: None,
             limit_restitution: None,
@@ -295,6 +298,8 @@ pub struct RawShape {
     pub length: Option<RawNumber>,
     /// Lengths of edges, m.
     pub size: Option<RawVec3>,
+    /// Semi-axes of an ellipsoid, m.
+    pub semi_axes: Option<RawVec3>,
     /// Direction across a plane; z where `None`.
     pub normal: Option<Spanned<[f64; 3]>>,
 }

@@ -95,6 +95,14 @@ pub enum LoopKind {
         /// Radius, m.
         radius: Value,
     },
+    /// An ellipsoid about the second frame's origin, with its axes along those of that frame, rolls on a plane of the first
+    /// frame without slip.
+    RollingEllipsoid {
+        /// Normal of the plane in the first frame, towards the ellipsoid.
+        normal: [f64; 3],
+        /// Semi-axes along x, y and z, m.
+        semi_axes: [Value; 3],
+    },
     /// A ball about the second frame's origin rolls on a ball about the first frame's without slip.
     RollingBalls {
         /// Radii of the first and the second ball, m.
@@ -244,7 +252,7 @@ const PLAIN: LoopSpec = LoopSpec {
 use Stands::{InBoth, InFirst, InSecond};
 
 /// Every kind of loop, in the order of the variants of [`LoopKind`].
-pub static LOOPS: [LoopSpec; 20] = [
+pub static LOOPS: [LoopSpec; 21] = [
     LoopSpec {
         directions: &[axis(InBoth)],
         rows: &[M, M, M, RAD, RAD],
@@ -327,6 +335,17 @@ pub static LOOPS: [LoopSpec; 20] = [
         numbers: &[number("radius")],
         rows: &[M, M, M],
         make: |n| LoopKind::RollingBall { normal: n.directions[0], radius: n.numbers[0] },
+        ..PLAIN
+    },
+    LoopSpec {
+        words: Words::new("rolling_ellipsoid", &[], &[]),
+        directions: &[normal(InFirst)],
+        numbers: &[NumberKey { key: "semi_axes", count: 3 }],
+        rows: &[M, M, M],
+        make: |n| {
+            let [x, y, z, ..] = n.numbers;
+            LoopKind::RollingEllipsoid { normal: n.directions[0], semi_axes: [x, y, z] }
+        },
         ..PLAIN
     },
     LoopSpec {
@@ -422,12 +441,13 @@ impl LoopKind {
             LoopKind::PointOnCylinder { .. } => 11,
             LoopKind::RollingDisc { .. } => 12,
             LoopKind::RollingBall { .. } => 13,
-            LoopKind::RollingBalls { .. } => 14,
-            LoopKind::RollingCapsules { .. } => 15,
-            LoopKind::RollingBallOnBox { .. } => 16,
-            LoopKind::RollingBallOnCylinder { .. } => 17,
-            LoopKind::KnifeEdge { .. } => 18,
-            LoopKind::Pfaffian { .. } => 19,
+            LoopKind::RollingEllipsoid { .. } => 14,
+            LoopKind::RollingBalls { .. } => 15,
+            LoopKind::RollingCapsules { .. } => 16,
+            LoopKind::RollingBallOnBox { .. } => 17,
+            LoopKind::RollingBallOnCylinder { .. } => 18,
+            LoopKind::KnifeEdge { .. } => 19,
+            LoopKind::Pfaffian { .. } => 20,
         };
         &LOOPS[index]
     }
@@ -449,6 +469,7 @@ impl LoopKind {
             | LoopKind::PointOnPlane { normal: a }
             | LoopKind::PointOnCylinder { axis: a, .. }
             | LoopKind::RollingBall { normal: a, .. }
+            | LoopKind::RollingEllipsoid { normal: a, .. }
             | LoopKind::RollingBallOnCylinder { axis: a, .. }
             | LoopKind::KnifeEdge { axis: a } => vec![a],
             LoopKind::Universal { axes: [a, b] }
@@ -471,6 +492,7 @@ impl LoopKind {
             | LoopKind::PointOnCylinder { radius: x, .. }
             | LoopKind::RollingDisc { radius: x, .. }
             | LoopKind::RollingBall { radius: x, .. } => vec![x],
+            LoopKind::RollingEllipsoid { semi_axes, .. } => semi_axes.iter_mut().collect(),
             LoopKind::RollingBalls { radii } => radii.iter_mut().collect(),
             LoopKind::RollingCapsules { lengths, radii, .. } => lengths.iter_mut().chain(radii).collect(),
             LoopKind::RollingBallOnBox { size, radius } => size.iter_mut().chain([radius]).collect(),
@@ -497,6 +519,7 @@ impl LoopKind {
             LoopKind::PointOnCylinder { radius, .. } => Closure::PointOnCylinder { radius },
             LoopKind::RollingDisc { radius, .. } => Closure::RollingDisc { radius },
             LoopKind::RollingBall { radius, .. } => Closure::RollingBall { radius },
+            LoopKind::RollingEllipsoid { semi_axes, .. } => Closure::RollingEllipsoid { semi_axes },
             LoopKind::RollingBalls { radii } => Closure::RollingBalls { radii },
             LoopKind::RollingCapsules { lengths, radii, .. } => Closure::RollingCapsules { lengths, radii },
             LoopKind::RollingBallOnBox { size, radius } => Closure::RollingBallOnBox { size, radius },

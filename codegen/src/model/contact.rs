@@ -57,6 +57,11 @@ pub enum ShapeKind {
         /// Length, m.
         length: f64,
     },
+    /// An ellipsoid with its axes along x, y and z.
+    Ellipsoid {
+        /// Semi-axes, m.
+        semi_axes: [f64; 3],
+    },
     /// The half space behind a plane through the origin.
     Plane {
         /// Direction out of it, of any length but zero.
@@ -70,17 +75,18 @@ pub enum ShapeKind {
 pub struct ShapeSpec {
     /// Its words.
     pub words: Words,
-    /// Keys of its dimensions: `radius`, `length`, `size` or `normal`.
+    /// Keys of its dimensions: `radius`, `length`, `size`, `semi_axes` or `normal`.
     pub keys: &'static [&'static str],
 }
 
 /// Every kind of shape, in the order of the variants of [`ShapeKind`].
-pub static SHAPES: [ShapeSpec; 6] = [
+pub static SHAPES: [ShapeSpec; 7] = [
     ShapeSpec { words: Words::new("point", &[], &["vertex", "corner"]), keys: &[] },
     ShapeSpec { words: Words::new("sphere", &[], &["ball"]), keys: &["radius"] },
     ShapeSpec { words: Words::new("capsule", &[], &["pill"]), keys: &["radius", "length"] },
     ShapeSpec { words: Words::new("box", &[], &["cube", "cuboid", "block"]), keys: &["size"] },
     ShapeSpec { words: Words::new("cylinder", &[], &["disc", "disk", "wheel"]), keys: &["radius", "length"] },
+    ShapeSpec { words: Words::new("ellipsoid", &[], &["egg", "spheroid"]), keys: &["semi_axes"] },
     ShapeSpec { words: Words::new("plane", &[], &["floor", "wall", "half_space", "halfspace"]), keys: &["normal"] },
 ];
 
@@ -100,7 +106,8 @@ impl ShapeKind {
             ShapeKind::Capsule { .. } => 2,
             ShapeKind::Box { .. } => 3,
             ShapeKind::Cylinder { .. } => 4,
-            ShapeKind::Plane { .. } => 5,
+            ShapeKind::Ellipsoid { .. } => 5,
+            ShapeKind::Plane { .. } => 6,
         };
         &SHAPES[index]
     }
@@ -135,6 +142,7 @@ mod tests {
             ShapeKind::Capsule { radius, length },
             ShapeKind::Box { size: [1.0, 2.0, 3.0] },
             ShapeKind::Cylinder { radius, length },
+            ShapeKind::Ellipsoid { semi_axes: [1.0, 2.0, 3.0] },
             ShapeKind::Plane { normal },
         ];
         assert_eq!(all.map(|kind| *kind.spec()), SHAPES);

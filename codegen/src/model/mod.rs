@@ -224,13 +224,15 @@ pub enum Gravity {
     Input,
 }
 
-/// Start of the closing of loops: coordinates of one joint.
+/// Start of one joint: its coordinates, with which the closing of loops begins, and its velocities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Start {
     /// Joint index, free.
     pub joint: usize,
     /// Its coordinates.
     pub q: Vec<f64>,
+    /// Its velocities, m/s and rad/s.
+    pub v: Vec<f64>,
     /// Whether they do not change when loops are closed.
     pub held: bool,
 }
@@ -259,6 +261,6 @@ pub struct Model {
     pub shapes: Vec<Shape>,
     /// Contacts: of pairs of shapes in file order, then stops of joints in the order of the joints.
     pub contacts: Vec<Contact>,
-    /// Initial coordinates, where they are not neutral.
+    /// Initial coordinates and velocities, where they are not neutral.
     pub starts: Vec<Start>,
 }

@@ -261,6 +261,20 @@ impl Plan {
         q
     }
 
+    /// Initial velocities: those of the model's `start_velocity`s, zero where it states none. `None` where it states no
+    /// velocity of any joint that is not zero.
+    pub fn start_velocity(&self) -> Option<Vec<f64>> {
+        let mut v = vec![0.0; self.dims.nv];
+        for slot in &self.slots {
+            let Some(Source::State { v: at, .. }) = slot.at else { continue };
+            // Of several, the first one counts.
+            if let Some(stated) = self.model.starts.iter().find(|s| s.joint == slot.joint) {
+                v[at..].iter_mut().zip(&stated.v).for_each(|(v, stated)| *v = *stated);
+            }
+        }
+        v.iter().any(|x| *x != 0.0).then_some(v)
+    }
+
     /// Which velocities belong to joints that keep their start when loops are closed.
     pub fn held(&self) -> Vec<bool> {
         let mut held = vec![false; self.dims.nv];

@@ -27,7 +27,7 @@ fn parts(model: &Model, name: &str) -> (LoopKind, Mount, Mount) {
 fn constraints_come_in_file_order() {
     let names: Vec<String> = clean(ALL).constraints.into_iter().map(|c| c.name).collect();
     let all =
-        "close guide gears tubes screw shaft shaft_2 table socket weld rod rail floor pipe disc marble marbles pills die drum skate odd rack";
+        "close guide gears tubes screw shaft shaft_2 table socket weld rod rail floor pipe disc marble marbles stone pills die drum skate odd rack";
     assert_eq!(names, all.split(' ').map(|n| n.replace("shaft_2", "shaft 2")).collect::<Vec<_>>());
 }
 
@@ -52,6 +52,7 @@ fn every_type_is_read() {
         ("disc", LoopKind::RollingDisc { normal: [0.0, 0.0, 3.0], axis: Y, radius: C(0.3) }),
         ("marble", LoopKind::RollingBall { normal: Z, radius: C(0.1) }),
         ("marbles", LoopKind::RollingBalls { radii: [C(0.1), lead] }),
+        ("stone", LoopKind::RollingEllipsoid { normal: Z, semi_axes: [C(0.1), C(0.2), lead] }),
         ("pills", LoopKind::RollingCapsules { axes: [X, Z], lengths: [C(0.3), C(0.0)], radii: [C(0.1), lead] }),
         ("die", LoopKind::RollingBallOnBox { size: [C(0.1), C(0.2), lead], radius: C(0.05) }),
         ("drum", LoopKind::RollingBallOnCylinder { axis: Y, length: C(0.4), radii: [C(0.1), C(0.2)] }),
@@ -124,7 +125,10 @@ fn couplings_name_joints_in_their_final_order() {
 fn starts_come_in_the_order_of_joints() {
     let m = clean(ALL);
     let degrees = f64::to_radians;
-    let start = |joint, q: &[f64], held| Start { joint, q: q.to_vec(), held };
+    let start = |joint: usize, q: &[f64], held| {
+        let v = vec![0.0; m.joints[joint].kind.nv()];
+        Start { joint, q: q.to_vec(), v, held }
+    };
     assert_eq!(
         m.starts,
         [
@@ -156,7 +160,9 @@ fn quaternions_are_scaled() {
 fn starts_need_no_loops() {
     let text =
         "[[body]]\nname = 'a'\nmass = 1\ncom = [1, 0, 0]\n[[joint]]\nname = 'j'\ntype = 'pin'\nchild = 'a'\nstart = 1";
-    assert_eq!(clean(text).starts, [Start { joint: 0, q: vec![1.0], held: false }]);
+    assert_eq!(clean(text).starts, [Start { joint: 0, q: vec![1.0], v: vec![0.0], held: false }]);
+    let moving = clean(&text.replace("start = 1", "start_velocity = -2.5")).starts;
+    assert_eq!(moving, [Start { joint: 0, q: vec![0.0], v: vec![-2.5], held: false }]);
     assert_eq!(clean(&text.replace("start = 1", "held = false")).starts, []);
     assert_eq!(clean(text).constraints, []);
 }

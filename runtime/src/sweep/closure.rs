@@ -91,6 +91,7 @@ impl<S: Copy> Closure<S> {
             | Closure::Spherical
             | Closure::RollingDisc { .. }
             | Closure::RollingBall { .. }
+            | Closure::RollingEllipsoid { .. }
             | Closure::RollingBalls { .. }
             | Closure::RollingCapsules { .. }
             | Closure::RollingBallOnBox { .. }
@@ -116,11 +117,13 @@ impl<S: Copy> Closure<S> {
     pub fn rolls(&self) -> bool {
         use Closure::{
             RollingBall, RollingBallOnBox, RollingBallOnCylinder, RollingBalls, RollingCapsules, RollingDisc,
+            RollingEllipsoid,
         };
         matches!(
             self,
             RollingDisc { .. }
                 | RollingBall { .. }
+                | RollingEllipsoid { .. }
                 | RollingBalls { .. }
                 | RollingCapsules { .. }
                 | RollingBallOnBox { .. }
@@ -201,7 +204,7 @@ impl<S: Scalar> Closure<S> {
             Closure::PointOnCylinder { radius } => {
                 rows[0] = force(scale3(S::one() / *radius, at.across()));
             }
-            Closure::RollingDisc { .. } | Closure::RollingBall { .. } => {
+            Closure::RollingDisc { .. } | Closure::RollingBall { .. } | Closure::RollingEllipsoid { .. } => {
                 let contact = self.contact(at);
                 for (row, k) in rows.iter_mut().zip([2, 0, 1]) {
                     *row = at_point(at.axis(k), contact);
@@ -231,6 +234,12 @@ impl<S: Scalar> Closure<S> {
                 let s = (n[0] * n[0] + n[1] * n[1]).sqrt();
                 let down = -(*radius / s);
                 [down * n[0], down * n[1], S::zero()]
+            }
+            // Where the normal of the ellipsoid is `-n`: its radius along `n` is the length of the semi-axes times `n`.
+            Closure::RollingEllipsoid { semi_axes } => {
+                let scaled: Vec3<S> = core::array::from_fn(|k| semi_axes[k] * n[k]);
+                let down = -(S::one() / dot3(scaled, scaled).sqrt());
+                core::array::from_fn(|k| down * (semi_axes[k] * scaled[k]))
             }
             _ => [S::zero(); 3],
         }
@@ -278,7 +287,9 @@ impl<S: Scalar> Closure<S> {
                 let across = at.across();
                 out[0] = half * (dot3(across, across) / *radius - *radius);
             }
-            Closure::RollingDisc { .. } | Closure::RollingBall { .. } => out[0] = dot3(z, add3(d, self.contact(at))),
+            Closure::RollingDisc { .. } | Closure::RollingBall { .. } | Closure::RollingEllipsoid { .. } => {
+                out[0] = dot3(z, add3(d, self.contact(at)));
+            }
             _ => {}
         }
         if let Some(touch) = self.touch(at) {

@@ -136,6 +136,7 @@ impl<S: Copy> Closure<S> {
             Closure::PointOnCylinder { radius } => Closure::PointOnCylinder { radius: of(radius) },
             Closure::RollingDisc { radius } => Closure::RollingDisc { radius: of(radius) },
             Closure::RollingBall { radius } => Closure::RollingBall { radius: of(radius) },
+            Closure::RollingEllipsoid { semi_axes } => Closure::RollingEllipsoid { semi_axes: semi_axes.map(of) },
             Closure::RollingBalls { radii } => Closure::RollingBalls { radii: radii.map(of) },
             Closure::RollingCapsules { lengths, radii } => {
                 Closure::RollingCapsules { lengths: lengths.map(&mut of), radii: radii.map(of) }

@@ -89,11 +89,14 @@ impl Writer<'_> {
 
     /// Writes the start of a joint, if it has one.
     pub(super) fn start(&self, out: &mut String, joint: usize) {
-        let Some(Start { q, held, .. }) = self.model.starts.iter().find(|s| s.joint == joint) else { return };
+        let Some(Start { q, v, held, .. }) = self.model.starts.iter().find(|s| s.joint == joint) else { return };
         let turns = turns(&self.model.joints[joint].kind);
         match q[..] {
             [x] => line(out, "start", self.number(Value::Const(x), turns)),
             _ => line(out, "start", format!("{q:?}")),
+        }
+        if v.iter().any(|x| *x != 0.0) {
+            line(out, "start_velocity", format!("{v:?}"));
         }
         if *held {
             line(out, "held", "true".to_string());

@@ -24,6 +24,7 @@ impl Writer<'_> {
                     line(out, "length", format!("{length:?}"));
                 }
                 ShapeKind::Box { size } => line(out, "size", format!("{size:?}")),
+                ShapeKind::Ellipsoid { semi_axes } => line(out, "semi_axes", format!("{semi_axes:?}")),
                 ShapeKind::Plane { normal } => line(out, "normal", format!("{normal:?}")),
             }
         }

@@ -3,6 +3,7 @@
 mod answers;
 mod edges;
 mod known;
+mod models;
 mod round;
 mod saltation;
 mod scene;

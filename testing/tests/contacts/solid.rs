@@ -99,23 +99,24 @@ fn least<const N: usize>(extent: [f64; N], f: impl Fn(&[f64; N]) -> f64) -> ([f6
     (best, value)
 }
 
-fn pair([a, b]: [Solid; 2], names: [&str; 2]) -> Model {
-    let body = |name: &str| {
-        format!(
-            "[[body]]\nname = \"{name}\"\nmass = 0.7\ninertia = [0.01, 0.02, 0.025]\n[[joint]]\nname = \"j{name}\"\ntype = \"floating\"\nparent = \"ground\"\nchild = \"{name}\"\n"
-        )
-    };
-    let contact = format!("[[contact]]\nname = \"c\"\nbetween = {names:?}\nfriction = 1\n");
-    model(&format!("name = \"pair\"\n{}{}{}{}{contact}", body("a"), body("b"), a.text("a"), b.text("b")))
+fn floating(name: &str) -> String {
+    format!(
+        "[[body]]\nname = \"{name}\"\nmass = 0.7\ninertia = [0.01, 0.02, 0.025]\n[[joint]]\nname = \"j{name}\"\ntype = \"floating\"\nparent = \"ground\"\nchild = \"{name}\"\n"
+    )
 }
 
-fn turned(q: &[f64], x: Vec3<f64>) -> Vec3<f64> {
+fn pair([a, b]: [Solid; 2], names: [&str; 2]) -> Model {
+    let contact = format!("[[contact]]\nname = \"c\"\nbetween = {names:?}\nfriction = 1\n");
+    model(&format!("name = \"pair\"\n{}{}{}{}{contact}", floating("a"), floating("b"), a.text("a"), b.text("b")))
+}
+
+pub(super) fn turned(q: &[f64], x: Vec3<f64>) -> Vec3<f64> {
     let (u, w) = ([q[3], q[4], q[5]], q[6]);
     let t = scale3(2.0, cross(u, x));
     add3(x, add3(scale3(w, t), cross(u, t)))
 }
 
-fn back(q: &[f64], x: Vec3<f64>) -> Vec3<f64> {
+pub(super) fn back(q: &[f64], x: Vec3<f64>) -> Vec3<f64> {
     turned(&[0.0, 0.0, 0.0, -q[3], -q[4], -q[5], q[6]], x)
 }
 
@@ -260,6 +261,62 @@ fn gaps_are_the_least_distances_and_rows_their_rates() {
         }
     }
     println!("gaps {:.1e}, rows {:.1e}, rates {:.1e}", worst[0], worst[1], worst[2]);
+}
+
+/// An ellipsoid on a plane, both on bodies that move: its gap against a search over its surface, its rows against the
+/// motion of the points that touch, whichever of the two the contact names first.
+#[test]
+fn an_ellipsoid_is_as_high_as_its_lowest_point() {
+    let semi_axes = [0.3, 0.2, 0.1];
+    let shapes = "[[shape]]\nname = \"plane\"\nbody = \"a\"\ntype = \"plane\"\nnormal = [0, 3, 4]\n\
+                  [[shape]]\nname = \"egg\"\nbody = \"b\"\ntype = \"ellipsoid\"\nsemi_axes = [0.3, 0.2, 0.1]\n";
+    let [mut scene, mut swapped] = [["plane", "egg"], ["egg", "plane"]].map(|names| {
+        let contact = format!("[[contact]]\nname = \"c\"\nbetween = {names:?}\nfriction = 1\n");
+        let text = format!("name = \"pair\"\n{}{}{shapes}{contact}", floating("a"), floating("b"));
+        Scene::new(model(&text), &[0.0; 14], &[0.0; 12])
+    });
+    let mut rng = Rng::new(8, 11);
+    for _ in 0..40 {
+        let q = [random_pose(&mut rng, 0.3), random_pose(&mut rng, 0.3)].concat();
+        let v: Vec<f64> = (0..12).map(|_| rng.around(1.0)).collect();
+        let n = turned(&q, [0.0, 0.6, 0.8]);
+        let height = |x: Vec3<f64>| dot3(n, less(placed(&q[7..], x), [q[0], q[1], q[2]]));
+        // The ball of which the ellipsoid is a stretched image, by the rays through its middle.
+        let on_egg = |x: &[f64; 3]| {
+            let length = norm(*x);
+            std::array::from_fn(|k| semi_axes[k] * x[k] / length)
+        };
+        let (x, lowest) = least([1.0; 3], |x| if norm(*x) == 0.0 { f64::INFINITY } else { height(on_egg(x)) });
+        let found = rows(&mut scene, &q, &v);
+        assert!((found.gap - lowest).abs() < 1e-13, "{} {lowest}", found.gap);
+        // The velocity of the lowest point of the egg against that of the plane's body at the same place. The search finds
+        // places to the root of rounding errors.
+        let at = placed(&q[7..], on_egg(&x));
+        let speed = |body: usize| {
+            let (k, p) = (6 * body, &q[7 * body..]);
+            let [lin, ang] = [k, k + 3].map(|k| turned(p, [v[k], v[k + 1], v[k + 2]]));
+            add3(lin, cross(ang, less(at, [p[0], p[1], p[2]])))
+        };
+        let slip = less(speed(1), speed(0));
+        let normal = dot3(slip, n);
+        let across = norm(less(slip, scale3(normal, n)));
+        let got = (found.rates[1] * found.rates[1] + found.rates[2] * found.rates[2]).sqrt();
+        assert!((found.rates[0] - normal).abs() < 1e-6, "{} {normal}", found.rates[0]);
+        assert!((got - across).abs() < 1e-6, "{got} {across}");
+        let h = 1e-5;
+        let [a, b] = [h, -h].map(|h| {
+            let mut q = later(&mut scene, &q, &v, h);
+            for k in [3, 10] {
+                let n = q[k..k + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
+                q[k..k + 4].iter_mut().for_each(|x| *x /= n);
+            }
+            rows(&mut scene, &q, &v).gap
+        });
+        // Errors of the quotient: h² and rounding over h, times curvatures of a few.
+        assert!(((a - b) * 0.5 / h - found.rates[0]).abs() < 1e-8, "{} {}", (a - b) * 0.5 / h, found.rates[0]);
+        let other = rows(&mut swapped, &q, &v);
+        assert!((other.gap - found.gap).abs() < 1e-15 && other.row == found.row);
+    }
 }
 
 /// Two capsules, exchanged with their bodies.

@@ -73,7 +73,7 @@ fn loop_kind(model: &Model, rng: &mut Rng) -> LoopKind {
     let axis = rng.pick(&[[0.0, 0.0, 1.0], axis]);
     let square = rng.pick(&[[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0.0, 0.0, 1.0], [3.0, -1.0, 0.0]]]);
     let size = value(model, rng, 0.1, 1.0);
-    match rng.below(20) {
+    match rng.below(21) {
         0 => LoopKind::Revolute { axis },
         1 => LoopKind::Prismatic { axis },
         2 => LoopKind::Cylindrical { axis },
@@ -93,6 +93,7 @@ fn loop_kind(model: &Model, rng: &mut Rng) -> LoopKind {
         16 => LoopKind::RollingBallOnBox { size: [size, value(model, rng, 0.1, 1.0), Value::ONE], radius: size },
         17 => LoopKind::RollingBallOnCylinder { axis, length: size, radii: [Value::ONE, size] },
         18 => LoopKind::KnifeEdge { axis },
+        19 => LoopKind::RollingEllipsoid { normal, semi_axes: [size, Value::ONE, size] },
         _ => LoopKind::Pfaffian { row: [Value::ONE, Value::ZERO, size, Value::ZERO, Value::ZERO, size] },
     }
 }
@@ -107,7 +108,8 @@ fn start(model: &Model, joint: usize, rng: &mut Rng) -> Option<Start> {
         let first = q.len() - 4;
         q[first..].copy_from_slice(&rng.pick(&[[0.0, 0.0, 0.0, 1.0], [0.6, 0.0, 0.0, -0.8], [0.5; 4]]));
     }
-    Some(Start { joint, q, held: rng.chance(0.3) })
+    let v = (0..j.kind.nv()).map(|_| rng.pick(&[0.0, 0.7, -2.0])).collect();
+    Some(Start { joint, q, v, held: rng.chance(0.3) })
 }
 
 #[test]

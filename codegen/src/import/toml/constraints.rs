@@ -103,6 +103,7 @@ fn list(
             let help = match key {
                 "row" => "write the factors of velocity and angular velocity: `[vx, vy, vz, wx, wy, wz]`",
                 "size" => "write the lengths of its edges along x, y and z",
+                "semi_axes" => "write half of its extents along x, y and z",
                 _ => "write one for the first of the two that `between` names and one for the second",
             };
             let message = format!("{what} needs {count} numbers and has {}", list.len());

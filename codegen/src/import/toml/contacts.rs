@@ -11,7 +11,8 @@ use super::numbers::Unit;
 use super::table::Table;
 use crate::model::SHAPES;
 
-const SHAPE: &[&str] = &["name", "body", "type", "xyz", "rpy", "rotate", "radius", "length", "size", "normal"];
+const SHAPE: &[&str] =
+    &["name", "body", "type", "xyz", "rpy", "rotate", "radius", "length", "size", "semi_axes", "normal"];
 const CONTACT: &[&str] = &["name", "between", "friction", "restitution", "law"];
 const CONTACTS: &[&str] = &["pairs", "friction", "restitution", "law"];
 
@@ -42,7 +43,7 @@ pub(super) fn surfaces(top: &Table, raw: &mut RawModel, findings: &mut Findings)
 /// What to do about shapes of other programs.
 fn special(lower: &str) -> Option<String> {
     let help = "describe it by a few spheres, capsules or points";
-    ["mesh", "hull", "hfield", "height_field", "ellipsoid"].contains(&lower).then(|| help.into())
+    ["mesh", "hull", "hfield", "height_field"].contains(&lower).then(|| help.into())
 }
 
 fn shape(table: &Table, raw: &mut RawModel, findings: &mut Findings) {
@@ -56,6 +57,7 @@ fn shape(table: &Table, raw: &mut RawModel, findings: &mut Findings) {
         radius: table.number("radius", Unit::Plain, findings),
         length: table.number("length", Unit::Plain, findings),
         size: table.vec3("size", Unit::Plain, findings),
+        semi_axes: table.vec3("semi_axes", Unit::Plain, findings),
         normal: table.direction("normal", findings),
     };
     match name {

@@ -30,6 +30,7 @@ const JOINT: &[&str] = &[
     "motion",
     "mimic",
     "start",
+    "start_velocity",
     "held",
     "limits",
     "limit_restitution",
@@ -146,6 +147,7 @@ pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     let stiffness = freedoms("stiffness", &[Unit::Plain]);
     let rest = freedoms("rest", units);
     let armature = freedoms("armature", &[Unit::Plain]);
+    let start_velocity = freedoms("start_velocity", &[Unit::Plain]);
     let motion = match table.choice("motion", &["free", "prescribed"], findings) {
         Some(choice) if choice.value == 1 => RawMotion::Prescribed(choice.span),
         _ => RawMotion::Free,
@@ -164,6 +166,7 @@ pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
         motion,
         mimic: mimic(&table, units, findings),
         start,
+        start_velocity,
         held: table.flag("held", findings),
         limits: limits(&table, units[0], findings),
         limit_restitution: table.number("limit_restitution", Unit::Plain, findings),

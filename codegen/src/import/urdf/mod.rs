@@ -121,6 +121,7 @@ fn plane(name: String, floor: Floor) -> RawShape {
         radius: None,
         length: None,
         size: None,
+        semi_axes: None,
         normal: None,
     }
 }

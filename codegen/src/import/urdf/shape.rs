@@ -125,6 +125,7 @@ fn shape(reader: &Reader, node: Node, body: &Spanned<String>, taken: &mut Taken)
         radius,
         length,
         size,
+        semi_axes: None,
         normal: None,
     })
 }
