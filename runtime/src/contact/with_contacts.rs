@@ -291,7 +291,8 @@ impl<Y: Touching> WithContacts<Y> {
         }
     }
 
-    fn rubs(&self, k: usize) -> bool {
+    /// Whether contact `k` slides with friction.
+    pub(super) fn rubs(&self, k: usize) -> bool {
         let c = self.contact(k);
         self.modes.as_ref()[k] == Mode::Slide && c.tangents && c.friction > Y::Scalar::zero()
     }

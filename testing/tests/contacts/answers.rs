@@ -294,11 +294,12 @@ fn a_block_rocks_from_edge_to_edge() {
     assert!((impact.energy + lost).abs() < 1e-9 * lost, "{} {lost}", impact.energy);
 }
 
-/// A wheel without a rim falls from spoke to spoke down a slope; its angular velocity comes to the one at which each impact
-/// takes what the slope gives: T. McGeer, Passive dynamic walking, 1990.
-#[test]
-fn a_rimless_wheel_comes_to_its_limit_cycle() {
-    let (spokes, length, slope, mass, inertia) = (8, 0.5, 0.08_f64, 2.0, 0.1);
+/// Number of spokes, length, slope, mass and inertia of the wheel without a rim.
+pub(super) const SPOKES: (u32, f64, f64, f64, f64) = (8, 0.5, 0.08, 2.0, 0.1);
+
+/// A wheel without a rim in a plane, on a slope; its coordinates are x along the slope, y across it, and an angle.
+pub(super) fn rimless_wheel() -> Model {
+    let (spokes, length, slope, mass, inertia) = SPOKES;
     let mut wheel = model(&format!(
         r#"
 name = "rimless_wheel"
@@ -327,6 +328,15 @@ rpy = [{{ deg = 90 }}, 0, 0]
         let [x, y, z] = second.placement.xyz;
         second.placement.xyz = [x, z, y];
     }
+    wheel
+}
+
+/// It falls from spoke to spoke; its angular velocity comes to the one at which each impact takes what the slope gives:
+/// T. McGeer, Passive dynamic walking, 1990.
+#[test]
+fn a_rimless_wheel_comes_to_its_limit_cycle() {
+    let (spokes, length, slope, mass, inertia) = SPOKES;
+    let (wheel, half) = (rimless_wheel(), PI / f64::from(spokes));
     let about = inertia + mass * length * length;
     let ratio = (inertia + mass * length * length * (2.0 * half).cos()) / about;
     let speed = (4.0 * mass * G * length * half.sin() * slope.sin() / (about * (1.0 - ratio * ratio))).sqrt();

@@ -73,7 +73,7 @@ fn a_bouncing_ball_comes_to_rest_at_the_sum_of_its_bounces() {
 }
 
 /// A block with two corners on the floor, in the plane of x and z; gravity is inclined instead of the floor.
-fn block(friction: f64, restitution: f64, slope: f64) -> Model {
+pub(super) fn block(friction: f64, restitution: f64, slope: f64) -> Model {
     let (x, z) = (9.81 * slope.sin(), -9.81 * slope.cos());
     let slider = |name: &str, parent: &str, axis: &str| {
         format!(

@@ -52,7 +52,7 @@ fn step(theta: f64, w: f64) -> (f64, State) {
 }
 
 /// A gait: a state after an impact that a step comes back to, by Newton's method with differences.
-fn gait(mut theta: f64, mut w: f64) -> [f64; 2] {
+pub(super) fn gait(mut theta: f64, mut w: f64) -> [f64; 2] {
     for _ in 0..20 {
         let miss = |theta: f64, w: f64| {
             let (_, end) = step(theta, w);
@@ -71,18 +71,33 @@ fn gait(mut theta: f64, mut w: f64) -> [f64; 2] {
     [theta, w]
 }
 
-/// A step of the shipped scene with feet of mass `foot`: the time of the impact, and `θ, θ̇` after it.
-fn scene_step(foot: f64, [theta, w]: [f64; 2], time: f64) -> [f64; 3] {
+/// Derivatives of the state after a step by that before it, by central differences.
+pub(super) fn step_derivatives([theta, w]: [f64; 2]) -> [[f64; 2]; 2] {
+    let d = 2e-5;
+    let end = |theta: f64, w: f64| step(theta, w).1;
+    // Two differences, of which the errors of second order cancel.
+    let slope = |at: &dyn Fn(f64) -> State, i: usize| {
+        let difference = |d: f64| (at(d)[i] - at(-d)[i]) / (2.0 * d);
+        (4.0 * difference(d) - difference(2.0 * d)) / 3.0
+    };
+    std::array::from_fn(|i| [slope(&|d| end(theta + d, w), i), slope(&|d| end(theta, w + d), i)])
+}
+
+/// The shipped scene on the slope of this file, with feet of mass `foot`.
+pub(super) fn with_feet(foot: f64) -> String {
     let text = include_str!("../../../models/contacts/simplest_walker.toml");
     let (mass, com) = (1.0 + foot, -foot / (1.0 + foot));
-    let text = text
-        .replace("gravity = [0.08828881, 0, -9.80960270]", &format!("gravity = [{}, 0, {}]", SLOPE.sin(), -SLOPE.cos()))
+    text.replace("gravity = [0.08828881, 0, -9.80960270]", &format!("gravity = [{}, 0, {}]", SLOPE.sin(), -SLOPE.cos()))
         .replace("mass = 1.001\n", &format!("mass = {mass}\n"))
         .replace("com = [0, 0, -0.000999000999]", &format!("com = [0, 0, {com}]"))
         .replace("inertia = [0.000999000999, 0.000999000999, 0]", &format!("inertia = [{0}, {0}, 0]", -com))
-        .replace("mass = 0.001\n", &format!("mass = {foot}\n"));
+        .replace("mass = 0.001\n", &format!("mass = {foot}\n"))
+}
+
+/// A step of the shipped scene with feet of mass `foot`: the time of the impact, and `θ, θ̇` after it.
+fn scene_step(foot: f64, [theta, w]: [f64; 2], time: f64) -> [f64; 3] {
     let q = [0.0, theta.cos(), theta, -2.0 * theta];
-    let mut scene = Scene::new(model(&text), &q, &[-w, 0.0, w, -(1.0 - (2.0 * theta).cos()) * w]);
+    let mut scene = Scene::new(model(&with_feet(foot)), &q, &[-w, 0.0, w, -(1.0 - (2.0 * theta).cos()) * w]);
     // In the middle of the step the straight leg has to pass the floor.
     scene.start();
     scene.motion.as_mut().unwrap().ignore(1, true);

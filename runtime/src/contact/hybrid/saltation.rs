@@ -26,6 +26,13 @@ const APPROACH: f64 = 1e-10;
 /// the same time for all neighbouring motions.
 const SAME: f64 = 1e-7;
 
+/// Difference of the derivatives of a step and of its pieces, as a part of the largest one, that is left; largest number
+/// of pieces.
+const AGREE: f64 = 1e-10;
+const PIECES: u32 = 1 << 12;
+/// Derivatives below this count as zero.
+const TINY: f64 = 1e-100;
+
 /// Reason why a motion with contacts has no derivative, or none that can be computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -76,6 +83,13 @@ pub enum SaltationError {
         /// Derivative of its gap, m (rad).
         derivative: f64,
     },
+    /// The derivatives of sliding contacts change so fast that pieces of a step do not agree with one another.
+    Stiff {
+        /// Time at which the step begins, s.
+        time: f64,
+        /// Their difference as a part of the largest derivative.
+        difference: f64,
+    },
     /// The tangent is not at the state of the motion, or not in its modes: it was started elsewhere, or has other inputs.
     Differs {
         /// Time of the motion, s.
@@ -118,6 +132,10 @@ impl core::fmt::Display for SaltationError {
             SaltationError::LeavesContact { contact, derivative } => write!(
                 f,
                 "the start of a tangent opens or overlaps contact {contact}, which is closed (derivative of its gap {derivative:.1e}): start along the contact"
+            ),
+            SaltationError::Stiff { time, difference } => write!(
+                f,
+                "derivatives change too fast in the step that begins at t = {time} s (difference {difference:.1e}): limit the steps"
             ),
             SaltationError::Differs { time } => write!(
                 f,
@@ -273,14 +291,55 @@ where
     }
 
     /// Follows a step of the motion without events to time `t`.
+    ///
+    /// Where contacts slide, the direction of slip of a neighbouring motion turns within `|v|/(µ N/m)` to that of the
+    /// motion. The error of a step does not show this fast change, because the motion itself has none: there, steps are
+    /// divided until their derivatives agree.
     fn follow(&mut self, t: S) -> Result<(), SaltationError> {
         let Tangent { system, motion, near: (q, p), .. } = self;
         let start = motion.solver.time();
         motion.solver.state(system, q, p);
         system.note_slip(start, q, p);
         motion.solver.limits.first_step = (t - start.re).to_f64();
+        self.run_to(t)?;
+        if !(0..self.system.modes().len()).any(|k| self.system.rubs(k)) {
+            return Ok(());
+        }
+        let longest = self.motion.solver.limits.max_step;
+        let mut pieces = 1;
+        let mut difference = f64::NAN;
+        while pieces < PIECES {
+            pieces *= 2;
+            let Tangent { system, motion, near: (q, p), .. } = self;
+            motion.solver.restart(system, start, q, p)?;
+            motion.solver.limits.max_step = longest.min((t - start.re).to_f64() / f64::from(pieces));
+            let done = self.run_to(t);
+            self.motion.solver.limits.max_step = longest;
+            difference = done?;
+            if difference <= AGREE {
+                return Ok(());
+            }
+        }
+        Err(SaltationError::Stiff { time: start.re.to_f64(), difference })
+    }
+
+    /// Goes to time `t` without events; gives the largest difference of the derivatives to those in `self.rates`, as a part
+    /// of the largest one, and leaves them there.
+    fn run_to(&mut self, t: S) -> Result<f64, SaltationError> {
+        let Tangent { system, motion, rates: (last_q, last_p), .. } = self;
         motion.solver.run(system, Dual::new(t, S::zero()))?;
-        Ok(())
+        motion.solver.state(system, &mut motion.q, &mut motion.p);
+        let differ = |new: &[Dual<S>], old: &mut [Dual<S>]| {
+            let mut most = 0.0_f64;
+            for (new, old) in new.iter().zip(old) {
+                most = most.max((new.du - old.du).to_f64().abs());
+                *old = *new;
+            }
+            most
+        };
+        let q = differ(motion.q.as_ref(), last_q.as_mut()) / largest(&motion.q).max(TINY);
+        let p = differ(motion.p.as_ref(), last_p.as_mut()) / largest(&motion.p).max(TINY);
+        Ok(q.max(p))
     }
 
     /// The function of an event at the state in `self.near`, and what its rate is known to be.
