@@ -40,6 +40,8 @@ pub struct Touched {
     pub closed: Vec<(usize, Mode)>,
     /// The sets of modes that were visited, and the time that was spent in each, s.
     pub visits: Vec<(Vec<Mode>, f64)>,
+    /// Forces of the contacts along their rows, N, for every row of the record; empty where nobody asked for them.
+    pub forces: Vec<Vec<[f64; 3]>>,
     /// Computing time, s.
     pub seconds: f64,
 }
@@ -49,6 +51,8 @@ struct Observer {
     record: Record,
     events: Vec<ContactEvent<f64>>,
     visits: Vec<(Vec<Mode>, f64)>,
+    /// Forces of the contacts at the rows, where they are kept.
+    forces: Option<Vec<Vec<[f64; 3]>>>,
     every: f64,
     time: f64,
     q: Vec<f64>,
@@ -68,6 +72,10 @@ impl Observer {
     }
 
     fn row(&mut self, system: &mut System, t: f64) {
+        if let Some(kept) = &mut self.forces {
+            // In a copy: nothing of the motion depends on whether it is drawn.
+            kept.push(system.clone().forces(t, &self.q, &self.p).to_vec());
+        }
         let (mechanism, record) = (system.system_mut(), &mut self.record);
         let mut v = vec![0.0; self.p.len()];
         mechanism.velocities(&self.q, &self.p, &mut v);
@@ -129,8 +137,8 @@ fn mechanism(plan: &Plan, interpreted: bool) -> Outcome<Mechanism> {
     Ok(mechanism)
 }
 
-/// Simulates from given coordinates and velocities.
-pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) -> Outcome<Touched> {
+/// Simulates from given coordinates and velocities. `with_forces` keeps the forces of the contacts at all rows.
+pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, with_forces: bool) -> Outcome<Touched> {
     let mut mechanism = mechanism(plan, settings.interpreted)?;
     mechanism.inputs().check_rank(&q).map_err(|e| super::source::rank_failure(&e))?;
     let mut p = v.clone();
@@ -142,6 +150,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
         record: Record::default(),
         events: Vec::new(),
         visits: Vec::new(),
+        forces: with_forces.then(Vec::new),
         every: settings.every,
         time: settings.time,
         q,
@@ -157,6 +166,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     Ok(Touched {
         record: Record { statistics, ..observer.record },
         events: observer.events,
+        forces: observer.forces.unwrap_or_default(),
         visits: observer.visits,
         contacts: *motion.contact_statistics(),
         closed: modes.filter(|(_, mode)| *mode != Mode::Open).collect(),
