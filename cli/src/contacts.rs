@@ -48,6 +48,8 @@ pub struct Touched {
     pub pressed: Vec<usize>,
     /// The sets of modes that were visited, and the time that was spent in each, s.
     pub visits: Vec<(Vec<Mode>, f64)>,
+    /// Forces of the contacts along their rows, N, for every row of the record; empty where nobody asked for them.
+    pub forces: Vec<Vec<[f64; 3]>>,
     /// Computing time, s.
     pub seconds: f64,
 }
@@ -58,6 +60,8 @@ struct Observer {
     events: Vec<ContactEvent<f64>>,
     changes: Vec<RegimeChange>,
     visits: Vec<(Vec<Mode>, f64)>,
+    /// Forces of the contacts at the rows, where they are kept.
+    forces: Option<Vec<Vec<[f64; 3]>>>,
     every: f64,
     time: f64,
     q: Vec<f64>,
@@ -77,6 +81,10 @@ impl Observer {
     }
 
     fn row(&mut self, system: &mut System, t: f64) {
+        if let Some(kept) = &mut self.forces {
+            // In a copy: nothing of the motion depends on whether it is drawn.
+            kept.push(system.clone().forces(t, &self.q, &self.p).to_vec());
+        }
         let (mechanism, record) = (system.system_mut(), &mut self.record);
         let mut v = vec![0.0; self.p.len()];
         mechanism.velocities(&self.q, &self.p, &mut v);
@@ -146,8 +154,8 @@ fn mechanism(plan: &Plan, interpreted: bool) -> Outcome<Mechanism> {
     Ok(mechanism)
 }
 
-/// Simulates from given coordinates and velocities.
-pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) -> Outcome<Touched> {
+/// Simulates from given coordinates and velocities. `with_forces` keeps the forces of the contacts at all rows.
+pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, with_forces: bool) -> Outcome<Touched> {
     let mut mechanism = mechanism(plan, settings.interpreted)?;
     mechanism.inputs().check_rank(&q).map_err(|e| super::source::rank_failure(&e))?;
     let mut p = v.clone();
@@ -160,6 +168,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
         events: Vec::new(),
         changes: Vec::new(),
         visits: Vec::new(),
+        forces: with_forces.then(Vec::new),
         every: settings.every,
         time: settings.time,
         q,
@@ -177,6 +186,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     Ok(Touched {
         record: Record { statistics, ..observer.record },
         events: observer.events,
+        forces: observer.forces.unwrap_or_default(),
         visits: observer.visits,
         contacts: *motion.contact_statistics(),
         stepping: *motion.stepping_statistics(),

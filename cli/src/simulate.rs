@@ -112,7 +112,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     })?;
     let table = table(&plan, &record);
     let mut files = vec![(csv.as_path(), table.as_str()), (svg.as_path(), picture.as_str())];
-    let motion = args.picture.as_deref().map(|file| (file, picture::svg(&plan, &record, &drawing)));
+    let motion = args.picture.as_deref().map(|file| (file, picture::svg(&plan, &record, &[], &drawing)));
     files.extend(motion.as_ref().map(|(file, text)| (*file, text.as_str())));
     write_files(&files)?;
     writeln!(out, "{}", title(&plan, &settings))?;
@@ -171,14 +171,14 @@ fn with_contacts(
             "leave them out; a second run with a smaller --tolerance shows the error",
         ));
     }
-    let touched = contacts::simulate(plan, start, settings)?;
+    let touched = contacts::simulate(plan, start, settings, args.picture.is_some())?;
     let record = &touched.record;
     let plot = plot::svg(&title(plan, settings), &panels(plan, record)).map_err(|e| {
         Failure::new(format!("cannot draw the plot: {e}"), "look at the numbers in the table; --csv names it")
     })?;
     let (table, events, beside) = (table(plan, record), contacts::table(plan, &touched.events), contacts::beside(csv));
     let mut files = vec![(csv, table.as_str()), (svg, plot.as_str()), (beside.as_path(), events.as_str())];
-    let motion = args.picture.as_deref().map(|file| (file, picture::svg(plan, record, drawing)));
+    let motion = args.picture.as_deref().map(|file| (file, picture::svg(plan, record, &touched.forces, drawing)));
     files.extend(motion.as_ref().map(|(file, text)| (*file, text.as_str())));
     let modes = args.record_modes.as_deref().map(|file| (file, modes::text(&plan.model, &touched.visits)));
     files.extend(modes.as_ref().map(|(file, text)| (*file, text.as_str())));

@@ -32,7 +32,7 @@ pub struct LoopKnobs {
     /// Probability that a constraint couples joints.
     pub coupling: f64,
     /// Weights of the kinds of loops, in the order of [`LoopKind`].
-    pub kinds: [f64; 21],
+    pub kinds: [f64; 20],
     /// Probability that a constraint has a `decay`.
     pub decay: f64,
     /// Probability that a loop may leave its joints no motion.
@@ -49,7 +49,7 @@ impl LoopKnobs {
             ground: 0.6,
             twice: 0.0,
             coupling: 0.1,
-            kinds: [1.0; 21],
+            kinds: [1.0; 20],
             decay: 0.0,
             locked: 0.0,
         }
@@ -68,8 +68,8 @@ impl LoopKnobs {
             tree.massless = 0.0;
         }
         let few = rng.chance(0.4);
-        let kinds: [f64; 21] = std::array::from_fn(|_| if few && rng.chance(0.7) { 0.0 } else { 1.0 });
-        let kinds = if kinds.iter().all(|w| *w == 0.0) { [1.0; 21] } else { kinds };
+        let kinds: [f64; 20] = std::array::from_fn(|_| if few && rng.chance(0.7) { 0.0 } else { 1.0 });
+        let kinds = if kinds.iter().all(|w| *w == 0.0) { [1.0; 20] } else { kinds };
         LoopKnobs {
             tree,
             planar,
@@ -372,7 +372,17 @@ impl Closer<'_> {
             10 => LoopKind::PointOnPlane { normal: self.sideways() },
             11 => LoopKind::PointOnCylinder { axis: self.direction(), radius: self.value(length) },
             12 => LoopKind::RollingDisc { normal: self.sideways(), axis: self.direction(), radius: self.value(length) },
-            13 => LoopKind::RollingBall { normal: self.sideways(), radius: self.value(length) },
+            13 => {
+                let (normal, radius) = (self.sideways(), self.value(length));
+                // Half of them are ellipsoids, by a number that is drawn anyway.
+                match normal[0] > 0.0 {
+                    true => {
+                        let [y, z] = [0.6, 0.9].map(|part| Value::Const(part * length));
+                        LoopKind::RollingEllipsoid { normal, semi_axes: [radius, y, z] }
+                    }
+                    false => LoopKind::RollingBall { normal, radius },
+                }
+            }
             14 => LoopKind::RollingBalls { radii: [0.4, 0.6].map(|part| self.value(part * length)) },
             15 => {
                 let axes = [self.sideways(), self.sideways()];
@@ -389,10 +399,6 @@ impl Closer<'_> {
                 LoopKind::RollingBallOnCylinder { axis, length: self.value(length), radii }
             }
             18 => LoopKind::KnifeEdge { axis: self.sideways() },
-            19 => {
-                let semi_axes = [0.4, 0.6, 0.9].map(|part| self.value(part * length));
-                LoopKind::RollingEllipsoid { normal: self.sideways(), semi_axes }
-            }
             _ => {
                 let row: [f64; 6] = std::array::from_fn(|_| self.rng.around(1.0));
                 LoopKind::Pfaffian { row: row.map(|x| self.value(x)) }

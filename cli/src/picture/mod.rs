@@ -1,6 +1,7 @@
 //! Pictures of a motion: the mechanism at several instants, as SVG text.
 
 mod shapes;
+mod touch;
 mod view;
 
 use std::fmt::Write as _;
@@ -15,6 +16,7 @@ use super::motion::Record;
 use super::plot::colour;
 use super::{Failure, Outcome};
 use shapes::{Line, Shapes};
+use touch::{Arrow, Scale, Touch};
 use view::{hull, Page, View};
 
 /// Settings of a picture.
@@ -48,9 +50,11 @@ pub fn drawing(plan: &Plan, args: &SimulateArgs) -> Outcome<Drawing> {
     Ok(Drawing { view: args.view, traces, strobes: usize::from(args.strobes) })
 }
 
-/// The picture.
-pub fn svg(plan: &Plan, record: &Record, drawing: &Drawing) -> String {
+/// The picture. `forces` are those of the contacts, along their rows, for every time of the record; nothing where none are
+/// known.
+pub fn svg(plan: &Plan, record: &Record, forces: &[Vec<[f64; 3]>], drawing: &Drawing) -> String {
     let shapes = Shapes::new(plan);
+    let mut touch = Touch::new(plan);
     let mut interpreter: Interpreter<f64> = plan.default_interpreter();
     let mut frames = |row: usize| -> Frames {
         let mut out = vec![FrameState::ground(); plan.frames.len()];
@@ -59,7 +63,21 @@ pub fn svg(plan: &Plan, record: &Record, drawing: &Drawing) -> String {
     };
     let last = record.t.len() - 1;
     let part = |k: usize, n: usize| if n < 2 { last } else { (k * last + (n - 1) / 2) / (n - 1) };
-    let instants: Vec<Frames> = (0..drawing.strobes).map(|k| frames(part(k, drawing.strobes))).collect();
+    let rows: Vec<usize> = (0..drawing.strobes).map(|k| part(k, drawing.strobes)).collect();
+    let instants: Vec<Frames> = rows.iter().map(|row| frames(*row)).collect();
+    // Poses of shapes and places of contacts.
+    let touched: Vec<Frames> = match &mut touch {
+        Some(touch) => rows.iter().map(|&row| touch.poses(&record.q[row], &record.v[row])).collect(),
+        None => Vec::new(),
+    };
+    let arrows: Vec<Vec<Arrow>> = touched
+        .iter()
+        .zip(&rows)
+        .map(|(poses, &row)| match (&touch, forces.get(row)) {
+            (Some(touch), Some(forces)) => touch.arrows(poses, forces),
+            _ => Vec::new(),
+        })
+        .collect();
     let paths: Vec<Vec<[f64; 3]>> = match drawing.traces.is_empty() {
         true => Vec::new(),
         false => {
@@ -69,10 +87,30 @@ pub fn svg(plan: &Plan, record: &Record, drawing: &Drawing) -> String {
         }
     };
     let seen = instants.iter().flat_map(|f| shapes.points(f)).chain(paths.iter().flatten().copied());
-    let seen: Vec<[f64; 3]> = seen.filter(|p| p.iter().all(|x| x.is_finite())).collect();
-    let view = View::new(drawing.view, &seen);
-    let page = Page::new(seen.iter().map(|p| view.project(*p)));
+    let mut seen: Vec<[f64; 3]> = seen.filter(|p| p.iter().all(|x| x.is_finite())).collect();
+    let flat = View::new(drawing.view, &seen);
+    let mut grounds = Vec::new();
+    if let (Some(touch), Some(poses)) = (&touch, touched.last()) {
+        let solids = touched.iter().flat_map(|poses| touch.solids(poses, false)).chain(touch.solids(poses, true));
+        seen.extend(solids.flat_map(|line| line.points).filter(|p| p.iter().all(|x| x.is_finite())));
+        grounds = touch.grounds(poses, &seen);
+    }
+    // What moves in a plane is seen from its side, whatever the widths of its shapes.
+    let view = if flat.sees_a_plane() { flat } else { View::new(drawing.view, &seen) };
+    let corners = grounds.iter().flat_map(|(corners, _)| corners.iter());
+    let mut page = Page::new(seen.iter().chain(corners).map(|p| view.project(*p)));
+    let scale = Scale::new(arrows.iter().flatten(), &page);
+    if let Some(scale) = &scale {
+        // Arrows fit on the page too.
+        let ends = arrows.iter().flatten().map(|(p, f)| std::array::from_fn(|k| p[k] + scale.metres * f[k]));
+        let corners = grounds.iter().flat_map(|(corners, _)| corners.iter().copied());
+        page = Page::new(seen.iter().copied().chain(corners).chain(ends).map(|p| view.project(p)));
+    }
     let mut text = page.head();
+    grounds.iter().for_each(|ground| touch::ground(&mut text, &page, &view, ground));
+    if let (Some(touch), Some(poses)) = (&touch, touched.last()) {
+        touch.solids(poses, true).iter().for_each(|line| body(&mut text, &page, &view, line, "#888"));
+    }
     let still = vec![FrameState::ground(); plan.frames.len()];
     body(&mut text, &page, &view, &shapes.ground(&still), "#777");
     for (k, frames) in instants.iter().enumerate() {
@@ -80,12 +118,18 @@ pub fn svg(plan: &Plan, record: &Record, drawing: &Drawing) -> String {
         let opacity = 0.14 + 0.86 * fade * fade * fade;
         let _ = writeln!(text, "<g opacity=\"{opacity:.2}\">");
         let mut lines = shapes.lines(frames);
+        if let (Some(touch), Some(poses)) = (&touch, touched.get(k)) {
+            lines.extend(touch.solids(poses, false));
+        }
         // Nearer parts are drawn over those behind them; parts at the same distance keep their order in spite of
         // rounding.
         let depth = |line: &Line| (view.depth(line.middle()) / (1e-6 * page.size())).round();
         lines.sort_by(|a, b| depth(a).total_cmp(&depth(b)));
         for line in &lines {
             body(&mut text, &page, &view, line, &hsl(line.colour));
+        }
+        if let (Some(scale), Some(arrows)) = (&scale, arrows.get(k)) {
+            arrows.iter().for_each(|arrow| scale.draw(&mut text, &page, &view, arrow));
         }
         text.push_str("</g>\n");
     }
@@ -96,7 +140,7 @@ pub fn svg(plan: &Plan, record: &Record, drawing: &Drawing) -> String {
         let _ =
             writeln!(text, "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.3\"/>");
     }
-    text + &page.foot(&caption(record, drawing))
+    text + &page.foot(&caption(record, drawing), scale.as_ref().map(|scale| scale.metres))
 }
 
 /// The caption below the picture.

@@ -1,6 +1,6 @@
 //! The shape of a mechanism: lines between the points at which its bodies are connected.
 
-use multibody::codegen::model::{ConstraintKind, LoopKind, Mount, Unit, Value};
+use multibody::codegen::model::{ConstraintKind, LoopKind, Mount, ShapeKind, Unit, Value};
 use multibody::codegen::plan::Plan;
 use multibody::runtime::sweep::FrameState;
 
@@ -108,9 +108,8 @@ impl Shapes {
                 LoopKind::RollingDisc { axis, radius, .. } => discs.push((second, axis, number(radius))),
                 LoopKind::RollingBall { radius, .. } => discs.push((second, [0.0, 1.0, 0.0], number(radius))),
                 LoopKind::RollingEllipsoid { semi_axes, .. } => {
-                    // The ellipse in the plane of x and z.
-                    let [x, y, z] = semi_axes.map(number);
-                    let widest = x.max(y).max(z);
+                    // Loops are drawn by circles: one that contains the ellipsoid.
+                    let widest = semi_axes.map(number).into_iter().fold(0.0, f64::max);
                     discs.push((second, [0.0, 1.0, 0.0], widest));
                 }
                 LoopKind::RollingBalls { radii } | LoopKind::RollingCapsules { radii, .. } => {
@@ -136,6 +135,14 @@ impl Shapes {
                     body.map_or(&mut ground, |b| &mut parts[b]).marks.push((p, false));
                 }
             }
+        }
+        // Feet and tips belong to the outline of their bodies, with the centre of mass where no joint holds one.
+        let tips = model.shapes.iter().filter(|s| matches!(s.kind, ShapeKind::Point | ShapeKind::Sphere { .. }));
+        for (b, tip) in tips.filter_map(|s| Some((s.mount.body?, point(&s.mount.placement.xyz)))) {
+            if parts[b].points.is_empty() {
+                parts[b].points.push(point(&model.bodies[b].com));
+            }
+            parts[b].points.push(tip);
         }
         for (body, part) in model.bodies.iter().zip(&mut parts) {
             let first = part.points.first().copied();

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use super::touch::arrow;
+
 /// A parallel projection.
 pub struct View {
     right: [f64; 3],
@@ -36,6 +38,11 @@ impl View {
         let above = if eye[2].abs() > 0.999 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
         let right = unit(cross(above, eye));
         View { right, up: cross(eye, right), eye }
+    }
+
+    /// Whether the eye looks along an axis of the ground.
+    pub fn sees_a_plane(&self) -> bool {
+        self.eye.iter().any(|x| x.abs() == 1.0)
     }
 
     /// Coordinates of a point to the right and up, m.
@@ -85,6 +92,12 @@ const HEIGHTS: [f64; 2] = [200.0, 640.0];
 const MARGIN: f64 = 24.0;
 /// Height of the scale and the caption below the picture, pixels.
 const FOOT: f64 = 34.0;
+
+/// The largest number of one digit, 1, 2 or 5, that is at most `x`.
+fn round(x: f64) -> f64 {
+    let decade = 10.0_f64.powf(x.log10().floor());
+    [5.0, 2.0, 1.0].into_iter().map(|m| m * decade).find(|l| *l <= x).unwrap_or(decade)
+}
 
 /// Scale and place.
 pub struct Page {
@@ -142,11 +155,9 @@ impl Page {
         )
     }
 
-    /// The scale, the caption, and the end of the file.
-    pub fn foot(&self, caption: &str) -> String {
-        let about = WIDTH / 6.0 / self.scale;
-        let decade = 10.0_f64.powf(about.log10().floor());
-        let length = [5.0, 2.0, 1.0].into_iter().map(|m| m * decade).find(|l| *l <= about).unwrap_or(decade);
+    /// The scale, that of forces in m on the page per N where there are any, the caption, and the end of the file.
+    pub fn foot(&self, caption: &str, force: Option<f64>) -> String {
+        let length = round(WIDTH / 6.0 / self.scale);
         let (x, y, to) = (MARGIN, self.height + FOOT / 2.0, MARGIN + length * self.scale);
         let mut text = String::new();
         let _ =
@@ -159,6 +170,12 @@ impl Page {
             WIDTH - MARGIN,
             y + 4.0
         );
+        if let Some(metres) = force {
+            let newtons = round(WIDTH / 8.0 / (metres * self.scale));
+            let (from, to) = (to + 92.0, to + 92.0 + newtons * metres * self.scale);
+            arrow(&mut text, [from, y], [to, y]);
+            let _ = writeln!(text, "<text x=\"{:.1}\" y=\"{}\" {font}>{newtons} N</text>", to + 8.0, y + 4.0);
+        }
         text + "</svg>\n"
     }
 }

@@ -188,3 +188,28 @@ fn robots_touch_a_floor_that_is_asked_for() {
     bad(run_in(&folder, &toml), &["a TOML model states its own limits and contacts"]);
     assert_eq!(run_in(&folder, &["check", "leg.urdf", "--friction", "0.3"]).status.code(), Some(2));
 }
+
+/// The picture has the floor, the ball and the force on it with its scale; the motion is the same as without it.
+#[test]
+fn pictures_show_what_touches_and_its_forces() {
+    let tables = [&[][..], &["--picture", "picture.svg", "--strobes", "4"]].map(|more: &[&str]| {
+        let folder = folder(if more.is_empty() { "contacts_plain" } else { "contacts_picture" });
+        let block = shipped("block_on_incline");
+        let push = ["--v", "-2,0,0,0,0,0", "--time", "1"];
+        good(run_in(&folder, &[&["simulate", &block], &push[..], more].concat()));
+        if !more.is_empty() {
+            let picture = std::fs::read_to_string(folder.join("picture.svg")).expect("a picture");
+            // 2 kg on an incline of 30 degrees press with 17 N: 10 N is a scale for them.
+            assert!(picture.contains(">10 N</text>") || picture.contains(">5 N</text>"), "{picture}");
+            assert!(
+                picture.contains("fill=\"#f0f0ec\"") || picture.contains("stroke=\"#aaa\""),
+                "no incline: {picture}"
+            );
+            // At least two corners carry the block at each of four instants; the scale is an arrow too.
+            let arrows = picture.matches("stroke=\"#d55e00\" stroke-width=\"2\"").count();
+            assert!((4 * 2 + 1..=4 * 4 + 1).contains(&arrows), "{arrows} arrows: {picture}");
+        }
+        std::fs::read_to_string(folder.join("block_on_incline.csv")).expect("a table")
+    });
+    assert_eq!(tables[0], tables[1]);
+}

@@ -5,7 +5,7 @@
 //! Ω_rel = b`; where what is left free is a joint that moves with `B`, it is constant.
 
 use super::touch::Touch;
-use crate::spatial::{add3, cross, dot3, scale3, Force, Motion, Vec3};
+use crate::spatial::{add3, cross, dot3, scale3, Force, Mat3, Motion, Vec3};
 use crate::tree::Closure;
 use crate::workspace::Relative;
 use crate::{Dual, Scalar};
@@ -296,6 +296,24 @@ impl<S: Scalar> Closure<S> {
             out[0] = touch.gap;
         }
         out
+    }
+
+    /// Where two surfaces that roll touch, in ground axes, m, and the directions of the forces of the three rows on the
+    /// second body: the normal and two across it. `a` and `b` are rotations to ground axes and origins, m, of the two
+    /// frames. `None` for constraints of other kinds.
+    pub fn touching(&self, a: (&Mat3<S>, Vec3<S>), b: (&Mat3<S>, Vec3<S>)) -> Option<(Vec3<S>, [Vec3<S>; 3])> {
+        if !self.rolls() {
+            return None;
+        }
+        let column = |m: &Mat3<S>, k: usize| [m[0][k], m[1][k], m[2][k]];
+        let axes: [Vec3<S>; 3] = core::array::from_fn(|i| column(b.0, i));
+        let way = add3(b.1, scale3(-S::one(), a.1));
+        let turn = core::array::from_fn(|i| core::array::from_fn(|k| dot3(axes[i], column(a.0, k))));
+        let at = Relative { turn, d: core::array::from_fn(|i| dot3(axes[i], way)) };
+        let arm = self.touch(&at).map_or_else(|| self.contact(&at), |touch| touch.at);
+        let ground = |x: Vec3<S>| core::array::from_fn(|i| dot3(b.0[i], x));
+        let rows = self.directions(&at);
+        Some((add3(b.1, ground(arm)), [0, 1, 2].map(|k: usize| ground(rows[k].lin))))
     }
 
     /// Rates of the components of `E_c`, where `B` moves with `rel` relative to `A`; zero where they are constant.

@@ -45,7 +45,7 @@ fn residuals_and_rates_agree() {
         }
     }
     println!("residuals {gap:.1e}, rates {worst:.1e}, {kinds:?}");
-    assert!(kinds.len() == 21 && kinds.values().all(|n| *n > 10), "{kinds:?}");
+    assert!(kinds.len() == 22 && kinds.values().all(|n| *n > 10), "{kinds:?}");
 }
 
 /// Along `q̇` and `ṗ⁺`, the velocities that follow from `(q, p⁺)` change by the accelerations. The test uses central

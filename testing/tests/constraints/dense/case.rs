@@ -28,7 +28,7 @@ pub fn system(seed: u64) -> LoopSystem {
         0 => random_loops(seed, &LoopKnobs::plain()),
         // In a plane, only two or three rows of each joint that closes a loop are independent.
         1 => {
-            let mut kinds = [0.0; 21];
+            let mut kinds = [0.0; 20];
             for (k, weight) in [(0, 3.0), (1, 1.0), (6, 1.0), (7, 1.0), (8, 1.0), (9, 1.0)] {
                 kinds[k] = weight;
             }

@@ -187,7 +187,7 @@ pub fn chain(seed: u64) -> LoopSystem {
     let mixed = [2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0];
     let kinds = if seed.is_multiple_of(2) { [1.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0] } else { mixed };
     let tree = Distribution { bodies: (3, 6), kinds, ..Distribution::default() };
-    let mut cuts = [0.0; 21];
+    let mut cuts = [0.0; 20];
     for k in [0, 1, 2, 5, 6, 7, 9, 10] {
         cuts[k] = 1.0;
     }

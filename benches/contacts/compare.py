@@ -1,0 +1,178 @@
+"""Error of the end state against run time: motions with contacts by this project and by MuJoCo, in one run.
+
+usage: compare.py OURS WORK [SCENE ...]
+
+OURS is the executable of `ours/`, WORK a folder for models and results. Each scene is one TOML model of this project;
+`mjcf.py` writes the same numbers for MuJoCo. The error is the largest distance, over all bodies, between where their
+origins and centres of mass end and where they should: by analysis where the answer is known, else by this project's run at
+its tightest tolerance. Both run in one thread, and times are the least of several rounds within the process that runs them.
+"""
+
+import json
+import math
+import pathlib
+import subprocess
+import sys
+import time
+
+import mujoco
+import numpy as np
+
+import mjcf
+import report
+
+MODELS = pathlib.Path(__file__).resolve().parents[2] / "models" / "contacts"
+TOLERANCES = ["1e-3", "1e-4", "1e-5", "1e-6", "1e-7", "1e-8", "1e-9", "1e-10", "1e-11", "1e-12", "1e-13"]
+STEPS = [4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5]
+ROUNDS = 3
+# A run of a rival that takes longer than this is its last one with these settings, s.
+PATIENCE = 3.0
+
+
+def block():
+    """Slides 2 m/s down an incline of 30 degrees and stops."""
+    text = (MODELS / "block_on_incline.toml").read_text()
+    text = text.replace("start = [0, 0, 0.05, 0, 0, 0, 1]", "start = [0, 0, 0.05, 0, 0, 0, 1]\nstart_velocity = [-2, 0, 0, 0, 0, 0]")
+    slope = math.radians(30)
+    way = 4 / (2 * 9.81 * (0.8 * math.cos(slope) - math.sin(slope)))
+    at = [-way * math.cos(slope) - 0.05 * math.sin(slope), 0, -way * math.sin(slope) + 0.05 * math.cos(slope)]
+    return text, 4.0, [at, at]
+
+
+def ball():
+    """Falls 1 m and bounces three times with a restitution of 0.8."""
+    text = (MODELS / "bouncing_ball.toml").read_text()
+    end, g, e = 2.0, 9.81, 0.8
+    t, v = math.sqrt(2 / g), e * math.sqrt(2 * g)
+    while t + 2 * v / g < end:
+        t, v = t + 2 * v / g, e * v
+    at = [0, 0, 0.05 + v * (end - t) - 0.5 * g * (end - t) ** 2]
+    return text, end, [at, at]
+
+
+def plain(name, end):
+    return lambda: ((MODELS / f"{name}.toml").read_text(), end, None)
+
+
+SCENES = {
+    "block": ("block stops on an incline", block),
+    "ball": ("ball bounces three times", ball),
+    "walker": ("compass gait, two steps", plain("compass_gait", 2.0)),
+    "dropped": ("quadruped dropped", plain("quadruped", 0.3)),
+    "standing": ("quadruped hops and stands", plain("quadruped_hop", 2.0)),
+}
+
+
+def damping_ratio(e):
+    """Of a spring that only pushes and gives back the part `e` of the speed, by bisection."""
+
+    def kept(z):
+        root = math.sqrt(1 - z * z)
+        return math.exp(-2 * z / root * math.atan2(root, z))
+
+    low, high = 0.0, 0.999
+    for _ in range(60):
+        z = 0.5 * (low + high)
+        low, high = (z, high) if kept(z) > e else (low, z)
+    return low
+
+
+def settings(scene, step):
+    """Settings by name: MuJoCo's defaults, and what makes its contacts harder."""
+    default, hard = "0.9 0.95 0.001 0.5 2", "0.99 0.9999 0.0001 0.5 2"
+
+    def one(integrator, solref, solimp, **more):
+        option = {"timestep": step, "integrator": integrator, "cone": "elliptic", "tolerance": 1e-12, "iterations": 200}
+        return {"option": option | more, "solref": solref, "solimp": solimp, "limits": solref if solref[0] != "-" else "0.02 1"}
+
+    if scene == "ball":
+        z = damping_ratio(0.8)
+        bounce = {}
+        for steps in (10, 40):
+            frequency = math.pi / (steps * step)
+            # Stiffness and damping without the weight of the body, which an impedance of nearly 1 gives.
+            solref = f"{-frequency * frequency!r} {-2 * z * frequency!r}"
+            for integrator in ("implicitfast", "RK4"):
+                bounce[f"spring, bounce of {steps} steps, {integrator}"] = one(integrator, solref, "0.9999 0.9999 0.001 0.5 2")
+        return bounce
+    stiff = f"{2 * step!r} 1"
+    return {
+        "default": one("implicitfast", "0.02 1", default),
+        "impratio 100": one("implicitfast", "0.02 1", default, impratio=100),
+        "hard": one("implicitfast", stiff, hard, impratio=100),
+        "hard, no slip": one("implicitfast", stiff, hard, impratio=100, noslip_iterations=20, noslip_tolerance=1e-12),
+        "stiff": one("implicitfast", stiff, default, impratio=100),
+        "hard, RK4": one("RK4", stiff, hard, impratio=100),
+    }
+
+
+def error(places, wanted):
+    if not np.all(np.isfinite(places)):
+        return math.inf
+    return float(np.max(np.linalg.norm(np.asarray(places) - np.asarray(wanted), axis=1)))
+
+
+def rival(scene, setting, end):
+    """Seconds, and places of the bodies in the order of the file."""
+    model = mujoco.MjModel.from_xml_string(scene.mjcf(setting))
+    data = mujoco.MjData(model)
+    count = round(end / setting["option"]["timestep"])
+    least = math.inf
+    for _ in range(ROUNDS):
+        mujoco.mj_resetData(model, data)
+        data.qpos[:], data.qvel[:] = scene.qpos, scene.qvel
+        mujoco.mj_forward(model, data)
+        clock = time.perf_counter()
+        mujoco.mj_step(model, data, nstep=count)
+        least = min(least, time.perf_counter() - clock)
+        if least > PATIENCE / ROUNDS:
+            break
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    places = []
+    for name in scene.order():
+        places += [data.body(name).xpos.copy(), data.body(name).xipos.copy()]
+    return least, places
+
+
+def compare(name, ours, work):
+    title, make = SCENES[name]
+    text, end, known = make()
+    path = work / f"{name}.toml"
+    path.write_text(text)
+    # All tolerances twice: in the first pass, machine code is made for the modes in which the motion stays.
+    command = [ours, str(path), repr(end), str(ROUNDS), *TOLERANCES, *TOLERANCES]
+    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    runs = [json.loads(line) for line in lines[len(TOLERANCES) :]]
+    wanted = known or runs[-1]["places"]
+    mine = [
+        {"setting": f"tolerance {r['tolerance']:g}", "seconds": r["seconds"], "error": error(r["places"], wanted), "events": len(r["events"])}
+        for r in (runs if known else runs[:-1])
+    ]
+    scene, theirs, slow = mjcf.Scene(path), [], set()
+    for step in STEPS:
+        for setting, values in settings(name, step).items():
+            if setting in slow:
+                continue
+            seconds, places = rival(scene, values, end)
+            theirs.append({"setting": setting, "step": step, "seconds": seconds, "error": error(places, wanted)})
+            if seconds > PATIENCE:
+                slow.add(setting)
+    return {"name": name, "title": title, "end": end, "known": known is not None, "ours": mine, "mujoco": theirs}
+
+
+def main():
+    ours, work, *names = sys.argv[1:]
+    work = pathlib.Path(work)
+    work.mkdir(parents=True, exist_ok=True)
+    results = []
+    for name in names or SCENES:
+        results.append(compare(name, ours, work))
+        print(f"{name}: done", flush=True)
+    result = {"mujoco": mujoco.__version__, "scenes": results}
+    (work / "result.json").write_text(json.dumps(result, indent=1) + "\n")
+    report.write(result, work)
+
+
+if __name__ == "__main__":
+    main()
