@@ -106,6 +106,7 @@ fn run(command: Option<Command>, out: &mut dyn Write) -> Outcome {
         Some(Command::Eval(a)) => eval::run(&a, out),
         Some(Command::Certify(a)) => certify::run(&a, out),
         Some(Command::Simulate(a)) => simulate::run(&a, out),
+        Some(Command::Modes(a)) => modes::run(&a, out),
         Some(Command::Explain(a)) => explain::run(&a, out),
         Some(Command::Identifiable(a)) => identifiable::run(&a, out),
     }

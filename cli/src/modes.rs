@@ -1,16 +1,18 @@
 //! Sets of modes of contacts: the argument `--modes`, and what they cost.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use multibody::codegen::jit::Compiled;
 use multibody::codegen::model::Model;
 use multibody::codegen::modes::{self, words, ModeChoice};
 use multibody::codegen::plan::Plan;
 use multibody::codegen::{self, Options, Output};
-use multibody::runtime::contact::rows_that_act;
+use multibody::runtime::contact::{rows_that_act, RegimeChoice};
 
-use super::{generate, source, Failure, Outcome};
+use super::args::ModesArgs;
+use super::output::{writable, write_files};
+use super::{contacts, generate, simulate, source, verdict, Failure, Outcome};
 
 /// The modes for which code is made: `masked`, `all`, or a file, relative to `folder`, that lists them.
 pub fn choice(argument: &str, folder: &Path, model: &Model) -> Outcome<ModeChoice> {
@@ -21,10 +23,47 @@ pub fn choice(argument: &str, folder: &Path, model: &Model) -> Outcome<ModeChoic
             let text = source::read(&folder.join(path))?;
             modes::parse(&text, model).map(ModeChoice::Listed).map_err(|errors| {
                 let lines: Vec<String> = errors.iter().map(|(line, what)| format!("{path}:{line}: {what}")).collect();
-                Failure::new(lines.join("\n"), "`mbd simulate MODEL --record-modes FILE` writes such a file")
+                Failure::new(lines.join("\n"), "`mbd modes MODEL --record FILE` writes such a file")
             })
         }
     }
+}
+
+/// Runs `mbd modes`.
+pub fn run(args: &ModesArgs, out: &mut dyn Write) -> Outcome {
+    let (plan, _) = simulate::planned(&args.motion)?;
+    let model = &plan.model;
+    if model.contacts.is_empty() {
+        return Err(Failure::new(
+            format!("`{}` has no contacts", model.name),
+            "add [[shape]] and [[contact]] to the model, or `limits` to a joint; of a URDF take --floor and --limits",
+        ));
+    }
+    let settings = simulate::settings(&args.motion)?;
+    if settings.regimes.choice == RegimeChoice::TimeSteps {
+        return Err(Failure::new(
+            "--contacts stepping: time steps visit no modes",
+            "leave it out: modes are those between events",
+        ));
+    }
+    let file = args.record.clone().unwrap_or_else(|| PathBuf::from(format!("{}.modes", model.name)));
+    writable(&file)?;
+    let (q, v, _) = simulate::start_closed(&plan, &args.motion)?;
+    verdict::start(&args.motion.model.model, &plan, &q)?;
+    let touched = contacts::simulate(&plan, (q, v), &settings)?;
+    write_files(&[(file.as_path(), modes::text(model, &touched.visits).as_str())])?;
+    writeln!(out, "{}", simulate::title(&plan, &settings))?;
+    let mut visits = touched.visits;
+    visits.sort_by(|a, b| b.1.total_cmp(&a.1));
+    writeln!(out, "Sets of modes that it visits: {}, with the time in each:", visits.len())?;
+    for (set, time) in &visits {
+        writeln!(out, "{:<40}{time:>12.6} s", words(set))?;
+    }
+    writeln!(out)?;
+    let sets = visits.into_iter().map(|(set, _)| set).collect();
+    let outputs = vec![Output::Rates];
+    count(&plan, &Options { outputs, modes: Some(ModeChoice::Listed(sets)), ..Options::default() }, out)?;
+    Ok(writeln!(out, "\nmodes: {}", file.display())?)
 }
 
 /// Operations and size of the code in every set of modes.

@@ -15,7 +15,7 @@ use multibody::runtime::integrate::{Control, Statistics, Step, Tolerances};
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Interpreter, System};
 
-use super::args::{ContactRegime, SimulateArgs};
+use super::args::{ContactRegime, MotionArgs, SimulateArgs};
 use super::motion::{simulate, Drift, Record, Settings, Spent};
 use super::output::{note, writable, write_files};
 use super::plot::{self, Panel};
@@ -33,20 +33,43 @@ const MOST_STEPS: f64 = 1e10;
 /// Limit of the number of rows.
 const MOST_ROWS: f64 = 1e7;
 
-/// Runs `mbd simulate`.
-pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
+/// The plan of the model that is to move, and whether it has dampers.
+pub fn planned(args: &MotionArgs) -> Outcome<(Plan, bool)> {
     let path = &args.model.model;
     let mut model = source::model_with(&args.model, &args.touch.of(args.model.import.import()))?;
-    let damped = model.joints.iter().any(|j| j.damping.iter().any(|d| *d != Value::ZERO));
     if args.no_damping {
         model.joints.iter_mut().for_each(|j| j.damping.fill(Value::ZERO));
     }
+    let damped = model.joints.iter().any(|j| j.damping.iter().any(|d| *d != Value::ZERO));
     let plan = source::planned(&model, PlanOptions { snap: args.snap, ..PlanOptions::default() }).plan;
     source::tell_notices(path, &plan.notices);
     if plan.dims.drive_v > 0 {
         note(format_args!("{}: notice: prescribed joints are held at zero", path.display()));
     }
-    if args.project && damped && !args.no_damping {
+    Ok((plan, damped))
+}
+
+/// The state from which the motion starts, with closed loops: coordinates, velocities.
+pub fn start_closed(plan: &Plan, args: &MotionArgs) -> Outcome<(Vec<f64>, Vec<f64>, Option<loops::Assembly>)> {
+    let (path, (q, v)) = (&args.model.model, start(plan, args)?);
+    if plan.model.constraints.is_empty() {
+        return Ok((q, v, None));
+    }
+    let mut interpreter = plan.default_interpreter();
+    let assembly = loops::assemble(path, plan, &mut interpreter, &q)?;
+    loops::tell(path, plan, &assembly);
+    let q = assembly.q.clone();
+    let stated = args.v.is_some() || plan.start_velocity().is_some();
+    let v = loops::velocities(plan, &mut interpreter, &q, &v, stated)?;
+    Ok((q, v, Some(assembly)))
+}
+
+/// Runs `mbd simulate`.
+pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
+    let path = &args.motion.model.model;
+    let (plan, damped) = planned(&args.motion)?;
+    let model = &plan.model;
+    if args.project && damped {
         return Err(Failure::new(
             "--project keeps the energy, but the model has dampers, which take it out",
             "leave them out with --no-damping, or leave --project out",
@@ -58,20 +81,8 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
             "leave it out: loops are kept closed anyway, and the energy with them; --hold says how",
         ));
     }
-    let settings = settings(args)?;
-    let (mut q, mut v) = start(&plan, args)?;
-    let assembly = match model.constraints.is_empty() {
-        true => None,
-        false => {
-            let mut interpreter = plan.default_interpreter();
-            let assembly = loops::assemble(path, &plan, &mut interpreter, &q)?;
-            loops::tell(path, &plan, &assembly);
-            q.clone_from(&assembly.q);
-            let stated = args.v.is_some() || plan.start_velocity().is_some();
-            v = loops::velocities(&plan, &mut interpreter, &q, &v, stated)?;
-            Some(assembly)
-        }
-    };
+    let settings = Settings { every: every(args)?, project: args.project, ..settings(&args.motion)? };
+    let (q, v, assembly) = start_closed(&plan, &args.motion)?;
     let csv = args.csv.clone().unwrap_or_else(|| PathBuf::from(format!("{}.csv", model.name)));
     let svg = args.svg.clone().unwrap_or_else(|| PathBuf::from(format!("{}.svg", model.name)));
     if csv == svg {
@@ -97,7 +108,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
             "leave it out, or add [[shape]] and [[contact]] to the model",
         ));
     }
-    if model.contacts.is_empty() && args.contacts != ContactRegime::Events {
+    if model.contacts.is_empty() && args.motion.contacts != ContactRegime::Events {
         return Err(Failure::new(
             format!("--contacts: `{}` has no contacts", model.name),
             "leave it out, or add [[shape]] and [[contact]] to the model",
@@ -140,7 +151,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
         }
     }
     writeln!(out, "work: {}", work(&record.statistics))?;
-    writeln!(out, "time: {}", spent(args.time, &record.spent))?;
+    writeln!(out, "time: {}", spent(args.motion.time, &record.spent))?;
     writeln!(out, "table: {} ({} rows)\nplot: {}", csv.display(), record.t.len(), svg.display())?;
     if let Some(file) = &args.picture {
         writeln!(out, "picture: {}", file.display())?;
@@ -192,7 +203,7 @@ fn with_contacts(
     writeln!(
         out,
         "time: {seconds:.3} s, {}; {}",
-        pace(args.time / seconds),
+        pace(args.motion.time / seconds),
         contacts::ways(&touched, settings.regimes.choice)
     )?;
     let (rows, count) = (record.t.len(), touched.events.len());
@@ -207,8 +218,18 @@ fn with_contacts(
     Ok(())
 }
 
-/// Method, steps and rows of the arguments.
-fn settings(args: &SimulateArgs) -> Outcome<Settings<'_>> {
+/// Time from one row to the next, s.
+fn every(args: &SimulateArgs) -> Outcome<f64> {
+    let time = args.motion.time;
+    let every = args.every.unwrap_or(time / args.rows.unwrap_or(ROWS) as f64);
+    if time / every > MOST_ROWS {
+        return Err(Failure::new(format!("{:.0} rows are too many", time / every), "raise --every or lower --rows"));
+    }
+    Ok(every)
+}
+
+/// Method and steps of the arguments, with a row at the end only.
+pub fn settings(args: &MotionArgs) -> Outcome<Settings<'_>> {
     // With `--step`, the default method is the classical one.
     let fallback = if args.step.is_some() { "rk4" } else { METHOD };
     let method = args.method.as_deref().unwrap_or(fallback);
@@ -236,19 +257,12 @@ fn settings(args: &SimulateArgs) -> Outcome<Settings<'_>> {
             Step::Adaptive(if args.partial { tolerances.coordinates_only() } else { tolerances })
         }
     };
-    let every = args.every.unwrap_or(args.time / args.rows.unwrap_or(ROWS) as f64);
-    if args.time / every > MOST_ROWS {
-        return Err(Failure::new(
-            format!("{:.0} rows are too many", args.time / every),
-            "raise --every or lower --rows",
-        ));
-    }
     Ok(Settings {
         method,
         step,
         time: args.time,
-        every,
-        project: args.project,
+        every: args.time,
+        project: false,
         hold: args.hold,
         interpreted: args.interpreted,
         regimes: regimes(args)?,
@@ -256,7 +270,7 @@ fn settings(args: &SimulateArgs) -> Outcome<Settings<'_>> {
 }
 
 /// How contacts are followed.
-fn regimes(args: &SimulateArgs) -> Outcome<RegimeRules> {
+fn regimes(args: &MotionArgs) -> Outcome<RegimeRules> {
     let choice = match args.contacts {
         ContactRegime::Events => RegimeChoice::Events,
         ContactRegime::Stepping => RegimeChoice::TimeSteps,
@@ -378,7 +392,7 @@ fn spent(time: f64, spent: &Spent) -> String {
 }
 
 /// Initial coordinates and velocities: those of the arguments, or the defaults that the help states.
-fn start(plan: &Plan, args: &SimulateArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
+fn start(plan: &Plan, args: &MotionArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
     let list = |what: &str, given: &Option<Vec<f64>>, names: Vec<String>, default: Vec<f64>| match given {
         None => Ok(default),
         Some(list) if list.len() == names.len() => Ok(list.clone()),

@@ -59,6 +59,8 @@ pub enum Command {
     Certify(CertifyArgs),
     /// Simulate; write a CSV file and a plot
     Simulate(SimulateArgs),
+    /// Find the modes of the contacts that a motion visits, and what they cost
+    Modes(ModesArgs),
     /// Show intermediate results of the generator
     Explain(ExplainArgs),
     /// Name the combinations of masses and inertias that a motion can identify
@@ -292,6 +294,48 @@ metre, steps that do not follow the motion, energy that is lost, and with --trus
 )]
 pub struct SimulateArgs {
     #[command(flatten)]
+    pub motion: MotionArgs,
+    /// Project every step onto the energy of the start, for motion that neither gains nor loses energy. The error of
+    /// the motion hardly changes
+    #[arg(long)]
+    pub project: bool,
+    /// Run the motion again at a tenth of the tolerance (fixed steps: at a quarter of the step), or in double-double
+    /// numbers; print the error of every coordinate at the end, how fast errors grow, and when no digit is left
+    #[arg(long, value_enum, value_name = "HOW", num_args = 0..=1, default_missing_value = "tenth")]
+    pub trust: Option<Trust>,
+    /// Table to write [default: NAME.csv in the current directory]
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Plot to write [default: NAME.svg in the current directory]
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
+    /// Rows of the table after that of the start, at equal times [default: 1000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub rows: Option<u64>,
+    /// Time from one row of the table to the next, s
+    #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "rows")]
+    pub every: Option<f64>,
+    /// File to write with the sets of modes of the contacts that the motion visits, for `mbd generate --modes`
+    #[arg(long, value_name = "FILE")]
+    pub record_modes: Option<PathBuf>,
+    /// SVG picture of the motion to write: the mechanism at several instants, the last one darkest
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
+    /// Direction from the mechanism to the eye [default: across its plane; in space from the front right, above]
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector, requires = "picture")]
+    pub view: Option<[f64; 3]>,
+    /// Bodies or frames whose paths are drawn, separated by commas
+    #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "picture")]
+    pub trace: Vec<String>,
+    /// Number of instants that are drawn
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500))]
+    pub strobes: u16,
+}
+
+/// A motion: the model, its start, and how it is computed.
+#[derive(Args)]
+pub struct MotionArgs {
+    #[command(flatten)]
     pub model: ModelArgs,
     #[command(flatten)]
     pub touch: TouchArgs,
@@ -307,10 +351,6 @@ pub struct SimulateArgs {
     /// Choose steps by the errors of the coordinates alone, not of the momenta
     #[arg(long, conflicts_with = "step")]
     pub partial: bool,
-    /// Project every step onto the energy of the start, for motion that neither gains nor loses energy. The error of
-    /// the motion hardly changes
-    #[arg(long)]
-    pub project: bool,
     /// Compute everything with the interpreter: the same numbers as the machine code that is otherwise made of the model,
     /// many times slower
     #[arg(long)]
@@ -324,52 +364,35 @@ pub struct SimulateArgs {
     /// Initial velocities, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     pub v: Option<Vec<f64>>,
-    /// Run the motion again at a tenth of the tolerance (fixed steps: at a quarter of the step), or in double-double
-    /// numbers; print the error of every coordinate at the end, how fast errors grow, and when no digit is left
-    #[arg(long, value_enum, value_name = "HOW", num_args = 0..=1, default_missing_value = "tenth")]
-    pub trust: Option<Trust>,
     /// Leave out the dampers of the model
     #[arg(long)]
     pub no_damping: bool,
     /// Angles this close to right angles are taken as exact, rad
     #[arg(long, value_name = "RAD", default_value_t = DEFAULT_SNAP, value_parser = snap)]
     pub snap: f64,
-    /// Table to write [default: NAME.csv in the current directory]
-    #[arg(long, value_name = "FILE")]
-    pub csv: Option<PathBuf>,
-    /// Plot to write [default: NAME.svg in the current directory]
-    #[arg(long, value_name = "FILE")]
-    pub svg: Option<PathBuf>,
-    /// Rows of the table after that of the start, at equal times [default: 1000]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
-    pub rows: Option<u64>,
-    /// Time from one row of the table to the next, s
-    #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "rows")]
-    pub every: Option<f64>,
     /// How contacts are followed
     #[arg(long, value_enum, value_name = "HOW", default_value = "events")]
     pub contacts: ContactRegime,
     /// Time step of `--contacts stepping` and `auto`, s
     #[arg(long, value_name = "S", value_parser = positive, default_value_t = 1e-3)]
     pub contact_step: f64,
-    /// File to write with the sets of modes of the contacts that the motion visits, for `mbd generate --modes`
-    #[arg(long, value_name = "FILE")]
-    pub record_modes: Option<PathBuf>,
     /// How loops are kept closed
     #[arg(long, value_parser = one_of(HOLD), default_value = "mass")]
     pub hold: Stabilisation,
-    /// SVG picture of the motion to write: the mechanism at several instants, the last one darkest
+}
+
+/// `mbd modes`.
+#[derive(Args)]
+#[command(
+    after_help = "The file lists the sets of modes, the one in which the motion was longest in front; `mbd generate --modes FILE` makes code for
+them. Printed are the operations and the bytes of machine code of the rates in each of them, and of the functions that serve all."
+)]
+pub struct ModesArgs {
+    #[command(flatten)]
+    pub motion: MotionArgs,
+    /// File to write with the sets of modes [default: NAME.modes in the current directory]
     #[arg(long, value_name = "FILE")]
-    pub picture: Option<PathBuf>,
-    /// Direction from the mechanism to the eye [default: across its plane; in space from the front right, above]
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector, requires = "picture")]
-    pub view: Option<[f64; 3]>,
-    /// Bodies or frames whose paths are drawn, separated by commas
-    #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "picture")]
-    pub trace: Vec<String>,
-    /// Number of instants that are drawn
-    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500))]
-    pub strobes: u16,
+    pub record: Option<PathBuf>,
 }
 
 /// How contacts are followed.

@@ -106,6 +106,22 @@ fn modes_are_recorded_counted_and_generated() {
 }
 
 #[test]
+fn modes_of_a_motion_are_found() {
+    let folder = folder("contacts_find_modes");
+    let hopper = shipped("hopper");
+    let output = good(run_in(&folder, &["modes", &hopper, "--time", "1", "--record", "run.modes"]));
+    assert!(out(&output).contains("Sets of modes that it visits: 2, with the time in each:"), "{}", out(&output));
+    for set in ["open open open ", "slide open open ", "all, by numbers "] {
+        assert!(out(&output).lines().any(|l| l.starts_with(set) && l.contains(" rates ")), "{}", out(&output));
+    }
+    assert_eq!(files(&folder), ["run.modes"]);
+    good(run_in(&folder, &["generate", &hopper, "--modes", "run.modes", "-o", "hopper.rs"]));
+    let pendulum = format!("{ROOT}/models/double_pendulum.toml");
+    bad(run_in(&folder, &["modes", &pendulum]), &["`double_pendulum` has no contacts", "--limits"]);
+    bad(run_in(&folder, &["modes", &hopper, "--contacts", "stepping"]), &["time steps visit no modes"]);
+}
+
+#[test]
 fn wrong_modes_are_refused() {
     let folder = folder("contacts_wrong_modes");
     let (hopper, quadruped) = (shipped("hopper"), shipped("quadruped"));
