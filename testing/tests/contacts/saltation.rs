@@ -378,9 +378,12 @@ impl Family for Corner {
 
 #[test]
 fn derivatives_of_a_free_box_that_strikes_with_a_corner() {
-    // It slides on after the impact.
-    let causes = compare(&Corner { restitution: 0.0 }, &[0.5, 1.0, 0.2, 0.1, 0.5, 1.0, 0.7, 0.2], 0.36, 1e-6);
-    assert_eq!(causes, [Cause::Landed]);
+    // It slides through the impact; with more friction it sticks in it, and begins to slide after it.
+    for friction in [0.2, 2.0] {
+        let x = [0.5, 1.0, 0.2, 0.1, 0.5, 1.0, 0.7, friction];
+        let causes = compare(&Corner { restitution: 0.0 }, &x, 0.36, 1e-6);
+        assert_eq!(causes, [Cause::Landed], "{friction}");
+    }
 }
 
 #[test]

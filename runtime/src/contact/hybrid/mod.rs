@@ -259,6 +259,8 @@ pub struct Hybrid<Y: Touching, M> {
     before: Y::PerContact<Mode>,
     /// Acceleration with which a contact falls back whose bounces have become too small, m/s² (rad/s²); zero without one.
     settling: Y::Scalar,
+    /// Largest acceleration with which a contact begins to slide, m/s²; zero where none does.
+    slipping: Y::Scalar,
     /// Whether nothing can move.
     immobile: bool,
     /// The contact, cause and force of an event that is being resolved, where they decide on the mode that follows.
@@ -305,6 +307,7 @@ where
             ignored: inner.per_contact(false),
             before: inner.per_contact(Mode::Open),
             settling: zero,
+            slipping: zero,
             immobile: false,
             forced: None,
             unchanged: false,

@@ -2,6 +2,7 @@
 
 use super::watch::Found;
 use super::{residual, Cause, ContactEvent, Departure, Hybrid, HybridError};
+use crate::contact::with_contacts::CREEP;
 use crate::contact::{impact, Impact, ImpactOptions, Mode, Touching, WithContacts};
 use crate::integrate::Stepper;
 use crate::system::Real;
@@ -9,6 +10,9 @@ use crate::Scalar;
 
 /// Speeds of approach below this part of the fastest of an event count as zero.
 const SLOW: f64 = 1e-9;
+
+/// First step, s, above which the one that the method chooses is taken.
+const LONGEST: f64 = 1e-4;
 
 /// Speed of approach, m/s (rad/s), below which there is no impact.
 const APPROACH: f64 = 1e-10;
@@ -81,7 +85,9 @@ where
             return Err(HybridError::NotFinite { time: t.to_f64() });
         }
         self.evaluate(system, t, false);
-        self.solver.limits.first_step = 0.0;
+        // Slip that begins has the direction of its acceleration while it is slow: the first step ends before it is not.
+        let creeps = CREEP / self.slipping.to_f64();
+        self.solver.limits.first_step = if creeps < LONGEST { creeps } else { 0.0 };
         self.solver.restart(system, t, &self.q, &self.p)?;
         Ok(())
     }

@@ -342,7 +342,7 @@ where
         Ok(q.max(p))
     }
 
-    /// The function of an event at the state in `self.near`, and what its rate is known to be.
+    /// The function of an event at the state in `self.near`.
     fn function(&mut self, t: Dual<S>, contact: usize, cause: Cause) -> Dual<S> {
         let Tangent { system, near: (q, p), .. } = self;
         system.look(t, q, p);

@@ -25,6 +25,7 @@ where
         self.touching.modes.as_mut().fill(Mode::Open);
         self.touching.slip.as_mut().fill([zero; 2]);
         self.touching.begins.as_mut().fill(false);
+        self.slipping = zero;
         if self.touching.count == 0 {
             return Ok(());
         }
@@ -94,6 +95,9 @@ where
             if along > still {
                 touching.slip.as_mut()[k] = [x / along, y / along];
                 touching.begins.as_mut()[k] = true;
+                if along > self.slipping {
+                    self.slipping = along;
+                }
             } else {
                 touching.modes.as_mut()[k] = Mode::Stick;
             }

@@ -9,6 +9,7 @@ use super::{
     energy, impact, solve, velocity, work_len, ContactError, Effort, Impact, ImpactOptions, ImpactOrder, Problem, Touch,
 };
 use crate::contact::{Contact, RestitutionLaw};
+use crate::Dual;
 
 /// A linear congruential generator; the high bits are used.
 struct Random(u64);
@@ -368,4 +369,55 @@ fn project([n, x, y]: [f64; 3], friction: f64) -> [f64; 3] {
     }
     let normal = (n + friction * t) / (1.0 + friction * friction);
     [normal, friction * normal / t * x, friction * normal / t * y]
+}
+
+/// Impulses on numbers with derivatives, against central differences of those on numbers. Where both sides of a difference
+/// disagree, a contact changes between them from sticking to sliding; few do.
+#[test]
+fn derivatives_of_impulses_are_those_of_differences() {
+    let mut r = Random(11);
+    let effort = Effort::ToTolerance { tolerance: 1e-14, rounds: 60 };
+    let (d, mut compared, mut kinks) = (1e-6, 0, 0);
+    for k in 0..600 {
+        // One contact with restitution is a process, whose derivative is that of its pieces.
+        let (contacts, e) = [(1, 0.0), (2, 0.0), (2, 0.8)][k % 3];
+        let (case, _) = random(&mut r, contacts, 3, 10.0, 1.0, e);
+        let n = case.b.len();
+        let (mut da, db) = (vec![0.0; n * n], (0..n).map(|_| r.between(-1.0, 1.0)).collect::<Vec<_>>());
+        for i in 0..n {
+            for j in 0..=i {
+                let x = r.between(-0.1, 0.1);
+                (da[i * n + j], da[j * n + i]) = (x, x);
+            }
+        }
+        let options = ImpactOptions { effort, ..ImpactOptions::default() };
+        let moved = |d: f64| {
+            let add = |x: &[f64], dx: &[f64]| x.iter().zip(dx).map(|(x, dx)| x + d * dx).collect::<Vec<_>>();
+            let case = Case { a: add(&case.a, &da), b: add(&case.b, &db), touches: case.touches.clone() };
+            case.impact(&options).map(|(_, impulses)| impulses)
+        };
+        let (Ok(less), Ok(here), Ok(more)) = (moved(-d), moved(0.0), moved(d)) else { continue };
+        let dual = |x: &[f64], dx: &[f64]| x.iter().zip(dx).map(|(x, dx)| Dual::new(*x, *dx)).collect::<Vec<_>>();
+        let constant = |x: f64| Dual::new(x, 0.0);
+        let touches = case.touches.iter().map(|touch| {
+            let Contact { row, tangents, friction, restitution, law } = touch.contact;
+            let (friction, restitution) = (constant(friction), constant(restitution));
+            Touch { contact: Contact { row, tangents, friction, restitution, law }, slip: None }
+        });
+        let (a, b, touches) = (dual(&case.a, &da), dual(&case.b, &db), touches.collect::<Vec<_>>());
+        let (mut impulses, mut work) = (vec![constant(0.0); n], vec![constant(0.0); work_len(n)]);
+        impact(&Problem { a: &a, b: &b, touches: &touches }, &options, &mut impulses, &mut work).unwrap();
+        let size = impulses.iter().fold(1.0_f64, |most, p| most.max(p.re.abs()).max(p.du.abs()));
+        let kink = (0..n).any(|i| (more[i] - 2.0 * here[i] + less[i]).abs() > 1e-3 * d * size);
+        kinks += u32::from(kink);
+        if kink {
+            continue;
+        }
+        compared += 1;
+        for i in 0..n {
+            let difference = (more[i] - less[i]) / (2.0 * d);
+            assert!((impulses[i].du - difference).abs() < 1e-5 * size, "{k}: {} {difference}", impulses[i].du);
+        }
+    }
+    assert!(compared > 550 && kinks < 10, "{compared} {kinks}");
 }
