@@ -375,7 +375,7 @@ impl Closer<'_> {
             13 => {
                 let (normal, radius) = (self.sideways(), self.value(length));
                 // Some of them are ellipsoids, by a number that is drawn anyway.
-                match normal[0] > 0.15 {
+                match length > 0.5 {
                     true => {
                         let [y, z] = [0.6, 0.9].map(|part| Value::Const(part * length));
                         LoopKind::RollingEllipsoid { normal, semi_axes: [radius, y, z] }
