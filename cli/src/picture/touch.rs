@@ -150,7 +150,7 @@ impl Touch {
             // A control character is in no name of the model.
             let name = format!("\u{1}{}", names.len());
             names.push(name.clone());
-            model.frames.push(Frame { name, body: mount.body, placement: mount.placement.clone() });
+            model.frames.push(Frame { name, body: mount.body, placement: mount.placement });
             names.len() - 1
         };
         let (mut planes, mut solids) = (Vec::new(), Vec::new());
@@ -205,7 +205,7 @@ impl Touch {
     /// Poses of the frames at coordinates and velocities.
     pub fn poses(&mut self, q: &[f64], v: &[f64]) -> Vec<FrameState<f64>> {
         let mut out = vec![FrameState::ground(); self.frames];
-        self.interpreter.frames(&q.to_vec(), &v.to_vec(), &mut out);
+        self.interpreter.frames(q, v, &mut out);
         out
     }
 
