@@ -374,8 +374,8 @@ impl Closer<'_> {
             12 => LoopKind::RollingDisc { normal: self.sideways(), axis: self.direction(), radius: self.value(length) },
             13 => {
                 let (normal, radius) = (self.sideways(), self.value(length));
-                // Half of them are ellipsoids, by a number that is drawn anyway.
-                match normal[0] > 0.0 {
+                // Some of them are ellipsoids, by a number that is drawn anyway.
+                match length > 0.5 {
                     true => {
                         let [y, z] = [0.6, 0.9].map(|part| Value::Const(part * length));
                         LoopKind::RollingEllipsoid { normal, semi_axes: [radius, y, z] }

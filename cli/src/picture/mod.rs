@@ -160,7 +160,7 @@ fn hsl(k: usize) -> String {
 /// One body: its outline and the marks of its joints.
 fn body(text: &mut String, page: &Page, view: &View, line: &Line, colour: &str) {
     let points: Vec<[f64; 2]> = line.points.iter().map(|p| view.project(*p)).collect();
-    let outline = if line.closed { points.clone() } else { hull(&points, 1e-3 * page.size()) };
+    let outline = if line.closed { points.clone() } else { hull(&points, line.flat * page.size()) };
     let list: Vec<String> = outline.iter().map(|p| page.at(*p)).collect();
     let (list, width) = (list.join(" "), line.width);
     let _ = match outline.len() {

@@ -7,12 +7,17 @@ use multibody::runtime::sweep::FrameState;
 /// Number of corners of a disc.
 const CORNERS: usize = 40;
 
+/// What [`Line::flat`] is for bars between joints.
+const BARS: f64 = 1e-3;
+
 /// Points that are drawn together, in ground axes, m.
 pub struct Line {
     /// Points.
     pub points: Vec<[f64; 3]>,
     /// Whether they are an outline already.
     pub closed: bool,
+    /// Part of the page's size below which corners of the outline are left out.
+    pub flat: f64,
     /// Joints, and whether each is prismatic.
     pub marks: Vec<([f64; 3], bool)>,
     /// Index of the colour.
@@ -168,7 +173,7 @@ impl Shapes {
         let rods = self.rods.iter().map(|rod| {
             let points: Vec<[f64; 3]> = rod.ends.iter().map(|(f, p)| placed(frames, *f, *p)).collect();
             let marks = points.iter().map(|p| (*p, false)).collect();
-            Line { points, closed: false, marks, colour: rod.colour, width: 1.6 }
+            Line { points, closed: false, flat: BARS, marks, colour: rod.colour, width: 1.6 }
         });
         self.parts.iter().map(|part| line(part, frames)).chain(rods).collect()
     }
@@ -191,6 +196,7 @@ fn line(part: &Part, frames: &[FrameState<f64>]) -> Line {
     Line {
         points: part.points.iter().map(at).collect(),
         closed: part.closed,
+        flat: BARS,
         marks: part.marks.iter().map(|(p, slides)| (at(p), *slides)).collect(),
         colour: part.colour,
         width: 3.0,

@@ -12,6 +12,8 @@ use multibody::runtime::Interpreter;
 use super::shapes::Line;
 use super::view::{Page, View};
 
+/// Part of the page's size below which corners of outlines are left out: round ones stay round.
+const ROUND: f64 = 1e-6;
 /// Steps around a ball, on which its outline is drawn.
 const AROUND: usize = 48;
 /// Length of the longest arrow, as a part of the page.
@@ -148,7 +150,7 @@ impl Touch {
             // A control character is in no name of the model.
             let name = format!("\u{1}{}", names.len());
             names.push(name.clone());
-            model.frames.push(Frame { name, body: mount.body, placement: mount.placement.clone() });
+            model.frames.push(Frame { name, body: mount.body, placement: mount.placement });
             names.len() - 1
         };
         let (mut planes, mut solids) = (Vec::new(), Vec::new());
@@ -203,7 +205,7 @@ impl Touch {
     /// Poses of the frames at coordinates and velocities.
     pub fn poses(&mut self, q: &[f64], v: &[f64]) -> Vec<FrameState<f64>> {
         let mut out = vec![FrameState::ground(); self.frames];
-        self.interpreter.frames(&q.to_vec(), &v.to_vec(), &mut out);
+        self.interpreter.frames(q, v, &mut out);
         out
     }
 
@@ -212,7 +214,14 @@ impl Touch {
         let solids = self.solids.iter().filter(|s| s.body.is_none() == ground).map(|solid| {
             let at = &poses[solid.frame];
             let points = solid.points.iter().map(|p| plus(at.position, rotated(&at.rotation, *p))).collect();
-            Line { points, closed: false, marks: Vec::new(), colour: solid.body.unwrap_or_default(), width: 1.4 }
+            Line {
+                points,
+                closed: false,
+                flat: ROUND,
+                marks: Vec::new(),
+                colour: solid.body.unwrap_or_default(),
+                width: 1.4,
+            }
         });
         let faces = self.planes.iter().filter(|_| !ground).filter_map(|plane| {
             let (at, half) = (&poses[plane.frame], 0.5 * plane.patch?);
@@ -221,7 +230,7 @@ impl Touch {
                 plus(at.position, rotated(&at.rotation, plus(times(i * half, x), times(k * half, y))))
             };
             let points = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(corner).to_vec();
-            Some(Line { points, closed: false, marks: Vec::new(), colour: 0, width: 1.4 })
+            Some(Line { points, closed: false, flat: ROUND, marks: Vec::new(), colour: 0, width: 1.4 })
         });
         solids.chain(faces).collect()
     }

@@ -50,7 +50,7 @@ fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) 
             }
             // A plane without a normal is across z.
             (None, true) if key != "normal" => {
-                let message = format!("{what}: {word} needs `{key}`");
+                let message = format!("{what}: {word} needs a `{key}`");
                 numbers.findings.error(raw.name.span, message, format!("add {example}"));
             }
             _ => {}

@@ -83,7 +83,7 @@ fn main() -> Result<(), Failed> {
 fn places(plan: &Plan, q: &[f64]) -> Vec<[f64; 3]> {
     let mut interpreter: Interpreter<f64> = plan.default_interpreter();
     let mut frames = vec![FrameState::ground(); plan.frames.len()];
-    interpreter.frames(&q.to_vec(), &vec![0.0; plan.dims.nv], &mut frames);
+    interpreter.frames(q, &vec![0.0; plan.dims.nv], &mut frames);
     let params = plan.default_params();
     let mut places = Vec::new();
     for body in &plan.model.bodies {
