@@ -50,7 +50,7 @@ pub fn run(args: &ModesArgs, out: &mut dyn Write) -> Outcome {
     writable(&file)?;
     let (q, v, _) = simulate::start_closed(&plan, &args.motion)?;
     verdict::start(&args.motion.model.model, &plan, &q)?;
-    let touched = contacts::simulate(&plan, (q, v), &settings)?;
+    let touched = contacts::simulate(&plan, (q, v), &settings, false)?;
     write_files(&[(file.as_path(), modes::text(model, &touched.visits).as_str())])?;
     writeln!(out, "{}", simulate::title(&plan, &settings))?;
     let mut visits = touched.visits;

@@ -1,25 +1,32 @@
 //! Time stepping: the impulses of all contacts of a step at once, without events.
 //!
-//! A step of Moreau's midpoint rule on `(q, p)`: half a step with the velocities at its start gives the place `q_m` where
-//! contacts are looked at; the rates there give the momenta without contacts at the end; impulses of the contacts are
-//! added to them; half a step with the velocities that follow leads to the end (J. J. Moreau, Numerical aspects of the
-//! sweeping process, Comput. Methods Appl. Mech. Eng. 177, 1999).
+//! A step of Moreau's midpoint rule on `(q, p)`: the explicit midpoint rule gives the end of the step without contacts.
+//! There, impulses of the contacts are added to the momenta. They act in the middle of the step: half a step with the
+//! velocities that they add leads to the end (J. J. Moreau, Numerical aspects of the sweeping process, Comput. Methods
+//! Appl. Mech. Eng. 177, 1999).
 //!
 //! A contact takes part where its gap would be closed at the end of the step: `0 ≤ P_n ⊥ v_n + max(g, 0)/(h/2) ≥ 0`, with
-//! its gap `g` at `q_m` and its velocity `v_n` after the impulses, and Coulomb's law on the exact cone. So what lands does
-//! not overlap, but for the curvature of its path. With restitution, a contact waits until its gap at `q_m` is closed, and
-//! then collides as in an [`impact`]; one whose approach is not faster than twice what forces add in a step has none.
+//! its velocity `v_n` after the impulses and its gap `g = g₁ − h v₁/2` in the middle of the step, from gap and rate at the end
+//! without contacts, and Coulomb's law on the exact cone. So what lands does not overlap, but for the curvature of its
+//! path. With restitution, a contact waits until its gap in the middle is closed, and then collides as in an [`impact`];
+//! one whose approach is not faster than twice what forces add in a step has none.
 //!
 //! The method is of order 1 at impacts and where slip ends, of order 2 in between. Impulses never add energy: their work is
 //! that of an impact with velocities that approach no slower. What friction holds does not move.
 
 use super::instant::Touches;
-use super::{impact, Certificate, ContactRules, HybridError, ImpactOptions, Stretch, Touching, WithContacts};
+use super::{
+    impact, Certificate, ContactError, ContactRules, Effort, HybridError, ImpactOptions, Stretch, Touching,
+    WithContacts,
+};
 use crate::constrained::PostStep;
 use crate::error::StepError;
 use crate::integrate::{Chart, Point};
 use crate::system::Real;
 use crate::Scalar;
+
+/// Relative residual of impulses that is enough where that of the rules is not reached: steps err by more.
+const RESIDUAL: f64 = 1e-7;
 
 /// What happened in a motion by time steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -61,6 +68,8 @@ pub struct TimeStepping<Y: Touching, B> {
     pd: Y::Momenta,
     /// Velocities of the rows at the start of the step.
     before: Y::Rows,
+    /// Velocities with which coordinates go on.
+    v: Y::Momenta,
     /// Whether a contact had an impulse in the last step, and whether it has one in this step.
     pressed: [Y::PerContact<bool>; 2],
     /// Times of the ends of the last step, s, and the state at its start.
@@ -90,6 +99,7 @@ where
             qd: inner.neutral(),
             pd: inner.zero_momenta(),
             before: inner.zero_rows(),
+            v: inner.zero_momenta(),
             pressed: [inner.per_contact(false), inner.per_contact(false)],
             span: [Y::Scalar::zero(); 2],
             last: (inner.neutral(), inner.zero_momenta()),
@@ -127,16 +137,18 @@ where
     ) -> Result<(), HybridError> {
         let half = Y::Scalar::constant(0.5) * h;
         self.fall(system, t, h, (q, p))?;
-        let middle = t + half;
-        system.look(middle, &self.q, &self.p);
+        system.look(t + h, &self.q, &self.p);
         self.take(system, half);
         self.pressed[1].as_mut().fill(false);
         if self.touching.count > 0 {
-            self.collide(system, middle)?;
-            system.look(middle, &self.q, &self.p);
+            self.v.as_mut().copy_from_slice(system.at.v.as_ref());
+            self.collide(system, t + h)?;
+            system.look(t + h, &self.q, &self.p);
+            for (v, after) in self.v.as_mut().iter_mut().zip(system.at.v.as_ref()) {
+                *v = *after - *v;
+            }
+            self.drift(system, t + h, half)?;
         }
-        // Half a step with the velocities that were found; momenta of groups are those of the same motion there.
-        self.drift(system, middle, half)?;
         let closed = self.post_step.close(system, t + h, false, &mut self.q, &mut self.p);
         closed.map_err(|error| StepError::Constraint { time: t.to_f64(), error })?;
         self.span = [t, t + h];
@@ -151,7 +163,8 @@ where
         Ok(())
     }
 
-    /// Goes on from `self.q` and `self.p`, where the system was looked at, for a time, with the velocities there.
+    /// Goes on from `self.q` and `self.p` for a time with the velocities `self.v`. Momenta of groups are those of the same
+    /// motion there.
     fn drift(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, time: Y::Scalar) -> Result<(), HybridError> {
         self.chart.load(system, t.to_f64(), &self.q, &self.p)?;
         self.displacement(system);
@@ -164,8 +177,8 @@ where
         Ok(())
     }
 
-    /// The middle of the step, and the momenta at its end if no contact acts, in `self.q` and `self.p`; velocities of the
-    /// rows at the start, in `self.before`.
+    /// The end of the step if no contact acts, in `self.q` and `self.p`; velocities of the rows at the start, in
+    /// `self.before`.
     fn fall(
         &mut self,
         system: &mut WithContacts<Y>,
@@ -186,9 +199,8 @@ where
         start.copy_from(point);
         chart.state(system, start, q, p);
         self.rate_at(system, t + half);
-        let Self { chart, start, point, q, p, .. } = self;
+        let Self { chart, point, q, p, .. } = self;
         point.scale(h);
-        point.x.as_mut().copy_from_slice(start.x.as_ref());
         if let Some(index) = point.not_finite() {
             return Err(StepError::NotFinite { time: t.to_f64(), index }.into());
         }
@@ -204,10 +216,10 @@ where
         chart.rates(system, start, (q, p), qd, point);
     }
 
-    /// The rate of the coordinates' displacement by the velocities that were looked at last, in `self.point`.
+    /// The rate of the coordinates' displacement by the velocities `self.v`, in `self.point`.
     fn displacement(&mut self, system: &mut WithContacts<Y>) {
-        let Self { chart, start, point, q, p, qd, .. } = self;
-        system.system.coordinate_rates(q, &system.at.v, qd);
+        let Self { chart, start, point, q, p, qd, v, .. } = self;
+        system.system.coordinate_rates(q, v, qd);
         start.clear();
         point.clear();
         chart.rates(system, start, (q, p), qd, point);
@@ -231,7 +243,8 @@ where
         self.touching.count = 0;
         let mut at = 0;
         for k in 0..system.modes().len() {
-            let (gap, rate, c) = (system.gap(k), system.gap_rate(k), system.contact(k));
+            let (rate, c) = (system.gap_rate(k), system.contact(k));
+            let gap = system.gap(k) - half * rate;
             let overlap = -gap.to_f64();
             self.statistics.overlap = self.statistics.overlap.max(overlap);
             let start = self.before.as_ref()[c.row];
@@ -258,8 +271,14 @@ where
         touching.assemble(system, t, &self.q);
         let options = ImpactOptions { effort: self.rules.effort, order: self.rules.order };
         let (problem, impulses, work) = touching.parts();
-        let result = impact(&problem, &options, impulses, work)
-            .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
+        let mut result = impact(&problem, &options, impulses, work);
+        if let (Err(ContactError::NoConvergence { .. }), Effort::ToTolerance { tolerance, rounds }) =
+            (result, options.effort)
+        {
+            let effort = Effort::ToTolerance { tolerance: tolerance.max(RESIDUAL), rounds };
+            result = impact(&problem, &ImpactOptions { effort, ..options }, impulses, work);
+        }
+        let result = result.map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
         // The work of the impulses: less than that with the velocities that were asked for, by what is still to be closed.
         let ahead = touching.order.as_ref()[..touching.count].iter().zip(touching.problem.as_ref());
         let shift = ahead.fold(Y::Scalar::zero(), |sum, (k, touch)| {
@@ -309,6 +328,7 @@ where
         q.as_mut().copy_from_slice(from_q);
         p.as_mut().copy_from_slice(from_p);
         system.look(at, &stepping.q, &stepping.p);
+        stepping.v.as_mut().copy_from_slice(system.at.v.as_ref());
         // Where the state cannot be continued, that of the nearer end is the answer.
         if stepping.drift(system, at, t - at).is_ok() {
             q.as_mut().copy_from_slice(stepping.q.as_ref());
