@@ -232,19 +232,12 @@ fn mechanisms_25_to_49() {
 
 #[test]
 fn code_of_some_rows() {
-    batch(0..30, Rows::Made);
+    batch(0..100, Rows::Made);
 }
 
 #[test]
 fn code_of_rows_that_act_by_numbers() {
-    batch(0..30, Rows::Input);
-}
-
-#[test]
-#[ignore = "takes two minutes"]
-fn code_of_rows_of_a_hundred_mechanisms() {
-    batch(30..100, Rows::Made);
-    batch(30..100, Rows::Input);
+    batch(0..100, Rows::Input);
 }
 
 /// Code of a mechanism with constraints has the outputs for constraints, by default and with all outputs; code of a
