@@ -136,8 +136,7 @@ where
     /// At time `t` (s) and a state, with steps `step` of the method between events.
     ///
     /// # Errors
-    /// [`HybridError`]; with [`RegimeChoice::Automatic`], contacts that are not resolved at the start are left to time
-    /// steps.
+    /// [`HybridError`], whatever the choice: what touches at the start is resolved as for a motion by events.
     pub fn new(
         system: &mut WithContacts<Y>,
         (method, step): (M, Step),
@@ -228,19 +227,10 @@ where
         t_end: Y::Scalar,
         observer: &mut impl ContactObserver<Y>,
     ) -> Result<(), HybridError> {
-        if self.rules.choice == RegimeChoice::Events {
-            let begin = self.events.time();
-            let result = self.events.run(system, t_end, observer);
-            self.statistics.time[0] += (self.events.time() - begin).to_f64();
-            return result;
-        }
-        let steps = self.events.limits_mut().steps;
-        let mut left = steps;
+        let limits = *self.events.limits_mut();
+        let mut left = limits.steps;
         while self.time() < t_end {
-            if left == 0 {
-                return Err(StepError::TooManySteps { time: self.time().to_f64(), steps }.into());
-            }
-            left -= 1;
+            limits.spend(&mut left, self.time().to_f64())?;
             self.advance(system, t_end, observer)?;
         }
         Ok(())
@@ -256,13 +246,12 @@ where
         t_end: Y::Scalar,
         observer: &mut impl ContactObserver<Y>,
     ) -> Result<(), HybridError> {
-        let begin = self.time();
-        let change = match self.regime {
+        let (begin, regime) = (self.time(), self.regime);
+        let change = match regime {
             Regime::Events => self.follow(system, t_end, observer)?,
             Regime::TimeSteps => self.step(system, t_end, observer)?,
         };
-        let spent = usize::from(change.is_some() != (self.regime == Regime::TimeSteps));
-        self.statistics.time[spent] += (self.time() - begin).to_f64();
+        self.statistics.time[regime as usize] += (self.time() - begin).to_f64();
         if let Some(reason) = change {
             self.statistics.changes += 1;
             let change = RegimeChange { time: self.time().to_f64(), regime: self.regime, reason };

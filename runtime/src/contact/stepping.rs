@@ -15,10 +15,7 @@
 //! that of an impact with velocities that approach no slower. What friction holds does not move.
 
 use super::instant::Touches;
-use super::{
-    impact, Certificate, ContactError, ContactRules, Effort, HybridError, ImpactOptions, Stretch, Touching,
-    WithContacts,
-};
+use super::{impact, ContactError, ContactRules, Effort, HybridError, ImpactOptions, Stretch, Touching, WithContacts};
 use crate::constrained::PostStep;
 use crate::error::StepError;
 use crate::integrate::{Chart, Point};
@@ -295,7 +292,7 @@ where
         s.limited += u64::from(result.limited.is_some());
         s.most = s.most.max(touching.count as u32);
         s.lost -= (result.energy - shift).to_f64();
-        s.residual = s.residual.max(residual(&result.certificate));
+        s.residual = s.residual.max(result.certificate.residual.to_f64());
         Ok(())
     }
 }
@@ -335,9 +332,4 @@ where
             p.as_mut().copy_from_slice(stepping.p.as_ref());
         }
     }
-}
-
-/// The relative residual of a solution.
-fn residual<S: Real>(certificate: &Certificate<S>) -> f64 {
-    certificate.residual.to_f64()
 }

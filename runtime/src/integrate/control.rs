@@ -1,5 +1,7 @@
 //! The choice of the steps of a run, and its limits.
 
+use crate::error::StepError;
+
 /// Allowed error of a component `y` in one step: `absolute + relative · |y|`. Where that is zero, the component is not
 /// controlled.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,5 +78,16 @@ pub struct Limits {
 impl Default for Limits {
     fn default() -> Self {
         Limits { min_step: 0.0, max_step: f64::INFINITY, first_step: 0.0, steps: u64::MAX }
+    }
+}
+
+impl Limits {
+    /// Takes one of the steps that are `left` of a call, at time `time` (s).
+    ///
+    /// # Errors
+    /// [`StepError::TooManySteps`] if none is left.
+    pub(crate) fn spend(&self, left: &mut u64, time: f64) -> Result<(), StepError> {
+        *left = left.checked_sub(1).ok_or(StepError::TooManySteps { time, steps: self.steps })?;
+        Ok(())
     }
 }

@@ -195,12 +195,10 @@ where
 
     /// One step of at most `left`, rejected ones included.
     pub(super) fn counted(&mut self, system: &mut Y, t_end: Y::Scalar, left: &mut u64) -> Result<(), StepError> {
-        if *left == 0 {
-            return Err(StepError::TooManySteps { time: self.time().to_f64(), steps: self.limits.steps });
-        }
+        self.limits.spend(left, self.time().to_f64())?;
         let before = self.rejections;
         self.advance(system, t_end)?;
-        *left = left.saturating_sub(1 + self.rejections - before);
+        *left = left.saturating_sub(self.rejections - before);
         Ok(())
     }
 

@@ -3,15 +3,17 @@
 mod land;
 mod resolve;
 mod saltation;
+mod saltation_error;
 mod select;
 mod watch;
 
-pub use saltation::{SaltationError, Tangent};
+pub use saltation::Tangent;
+pub use saltation_error::SaltationError;
 
 use super::instant::Touches;
 #[cfg(doc)]
 use super::Way;
-use super::{Certificate, ContactError, Effort, Impact, ImpactOrder, Mode, RegimeChange, Touching, WithContacts};
+use super::{ContactError, Effort, Impact, ImpactOrder, Mode, RegimeChange, Touching, WithContacts};
 use crate::error::StepError;
 use crate::integrate::{Limits, Solver, Statistics, Step, Stepper};
 use crate::system::Real;
@@ -400,11 +402,7 @@ where
     ) -> Result<(), HybridError> {
         let mut left = self.solver.limits.steps;
         while self.time() < t_end {
-            if left == 0 {
-                let (time, steps) = (self.time().to_f64(), self.solver.limits.steps);
-                return Err(HybridError::Step(StepError::TooManySteps { time, steps }));
-            }
-            left -= 1;
+            self.solver.limits.spend(&mut left, self.time().to_f64())?;
             self.advance(system, t_end, observer)?;
         }
         Ok(())
@@ -459,9 +457,4 @@ where
     fn count(&self, system: &WithContacts<Y>) -> usize {
         system.modes().len()
     }
-}
-
-/// The relative residual of a solution.
-fn residual<S: Real>(certificate: &Certificate<S>) -> f64 {
-    certificate.residual.to_f64()
 }

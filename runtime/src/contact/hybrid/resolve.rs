@@ -1,7 +1,7 @@
 //! What happens at an event: impulses, then the modes of the motion that follows.
 
 use super::watch::Found;
-use super::{residual, Cause, ContactEvent, Departure, Hybrid, HybridError};
+use super::{Cause, ContactEvent, Departure, Hybrid, HybridError};
 use crate::contact::with_contacts::CREEP;
 use crate::contact::{impact, Impact, ImpactOptions, Mode, Touching, WithContacts};
 use crate::integrate::Stepper;
@@ -15,7 +15,7 @@ const SLOW: f64 = 1e-9;
 const LONGEST: f64 = 1e-4;
 
 /// Speed of approach, m/s (rad/s), below which there is no impact.
-const APPROACH: f64 = 1e-10;
+pub(super) const APPROACH: f64 = 1e-10;
 
 impl<Y, M> Hybrid<Y, M>
 where
@@ -157,7 +157,7 @@ where
         self.statistics.impacts += 1;
         self.statistics.lost -= result.energy.to_f64();
         self.statistics.limited += u64::from(result.limited.is_some());
-        self.statistics.residual = self.statistics.residual.max(residual(&result.certificate));
+        self.statistics.residual = self.statistics.residual.max(result.certificate.residual.to_f64());
     }
 
     /// Marks contacts whose bounces have become smaller than the rules follow, and makes their impact plastic. Gives the

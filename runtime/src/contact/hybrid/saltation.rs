@@ -9,10 +9,10 @@
 //! Kong et al., Saltation matrices: the essential tool for linearizing hybrid dynamical systems, Proc. IEEE 112, 2024).
 //! `R` and `g` are those of the motion itself, evaluated on numbers with derivatives.
 
+use super::resolve::APPROACH;
 use super::watch::{Found, Watched};
-use super::{Cause, ContactEvent, ContactObserver, Hybrid, HybridError};
+use super::{Cause, ContactEvent, ContactObserver, Hybrid, SaltationError};
 use crate::contact::{Mode, Touching, WithContacts};
-use crate::error::StepError;
 use crate::integrate::{Step, Stepper};
 use crate::system::{Real, System};
 use crate::{Dual, Scalar};
@@ -20,8 +20,6 @@ use crate::{Dual, Scalar};
 /// Speed of approach of a landing, m/s (rad/s), below which its time has no derivative that could be told from an infinite
 /// one: derivatives grow with the reciprocal of this speed.
 const GRAZING: f64 = 1e-7;
-/// Speed of approach, m/s (rad/s), above which contacts that touch collide.
-const APPROACH: f64 = 1e-10;
 /// Derivatives below this part of the largest one of the state count as zero: what has to stay closed, and what happens at
 /// the same time for all neighbouring motions.
 const SAME: f64 = 1e-7;
@@ -32,120 +30,6 @@ const AGREE: f64 = 1e-10;
 const PIECES: u32 = 1 << 12;
 /// Derivatives below this count as zero.
 const TINY: f64 = 1e-100;
-
-/// Reason why a motion with contacts has no derivative, or none that can be computed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum SaltationError {
-    /// The motion itself, or a step of a tangent, fails.
-    Motion(HybridError),
-    /// The function of an event hardly changes its sign: a neighbouring motion may miss the event.
-    Grazing {
-        /// Time, s.
-        time: f64,
-        /// The contact.
-        contact: usize,
-        /// Reason of the event.
-        cause: Cause,
-        /// Rate of the function: of the gap, m/s (rad/s); of the normal force or the distance from the friction cone, N/s;
-        /// of the speed of slip, m/s².
-        rate: f64,
-    },
-    /// Two contacts have their events at the same time, which in neighbouring motions happen one after the other. What
-    /// follows depends on their order.
-    Simultaneous {
-        /// Time, s.
-        time: f64,
-        /// The contacts.
-        contacts: [usize; 2],
-        /// Derivative of what would have to stay zero for both to happen together: of the second one's gap, m (rad), or
-        /// of its speed of slip, m/s. Not a number where forces decide.
-        derivative: f64,
-    },
-    /// Bounces without end are left out.
-    Accumulation {
-        /// Time, s.
-        time: f64,
-        /// The contact.
-        contact: usize,
-    },
-    /// The forces of redundant contacts, by which the event was found, are not unique.
-    Redundant {
-        /// Time, s.
-        time: f64,
-        /// The contact.
-        contact: usize,
-    },
-    /// In the direction of a tangent's start, a closed contact opens or its bodies overlap.
-    LeavesContact {
-        /// The contact.
-        contact: usize,
-        /// Derivative of its gap, m (rad).
-        derivative: f64,
-    },
-    /// The derivatives of sliding contacts change so fast that pieces of a step do not agree with one another.
-    Stiff {
-        /// Time at which the step begins, s.
-        time: f64,
-        /// Their difference as a part of the largest derivative.
-        difference: f64,
-    },
-    /// The tangent is not at the state of the motion, or not in its modes: it was started elsewhere, or has other inputs.
-    Differs {
-        /// Time of the motion, s.
-        time: f64,
-    },
-}
-
-impl From<HybridError> for SaltationError {
-    fn from(error: HybridError) -> Self {
-        SaltationError::Motion(error)
-    }
-}
-
-impl From<StepError> for SaltationError {
-    fn from(error: StepError) -> Self {
-        SaltationError::Motion(HybridError::Step(error))
-    }
-}
-
-impl core::fmt::Display for SaltationError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            SaltationError::Motion(error) => write!(f, "{error}"),
-            SaltationError::Grazing { time, contact, cause, rate } => write!(
-                f,
-                "the event {cause:?} of contact {contact} at t = {time} s grazes (rate {rate:.1e}): the motion has no derivative there"
-            ),
-            SaltationError::Simultaneous { time, contacts: [a, b], derivative } => write!(
-                f,
-                "contacts {a} and {b} have events at the same time, t = {time} s, whose order neighbouring motions decide (derivative {derivative:.1e}): the motion has no derivative there"
-            ),
-            SaltationError::Accumulation { time, contact } => write!(
-                f,
-                "the bounces of contact {contact} accumulate at t = {time} s: derivatives end there; make the impact plastic, or end sooner"
-            ),
-            SaltationError::Redundant { time, contact } => write!(
-                f,
-                "contact {contact} changes its mode at t = {time} s by forces that are not unique: use fewer contacts"
-            ),
-            SaltationError::LeavesContact { contact, derivative } => write!(
-                f,
-                "the start of a tangent opens or overlaps contact {contact}, which is closed (derivative of its gap {derivative:.1e}): start along the contact"
-            ),
-            SaltationError::Stiff { time, difference } => write!(
-                f,
-                "derivatives change too fast in the step that begins at t = {time} s (difference {difference:.1e}): limit the steps"
-            ),
-            SaltationError::Differs { time } => write!(
-                f,
-                "a tangent is not at the state of the motion at t = {time} s, or not in its modes: start it there, with the same inputs"
-            ),
-        }
-    }
-}
-
-impl core::error::Error for SaltationError {}
 
 /// The derivative of a motion along one direction: of its start, of its inputs or parameters, or of both. Tangents along
 /// the unit directions are the columns of the matrix of sensitivities.
@@ -541,11 +425,7 @@ where
     {
         let mut left = self.solver.limits.steps;
         while self.time() < t_end {
-            if left == 0 {
-                let (time, steps) = (self.time().to_f64(), self.solver.limits.steps);
-                return Err(StepError::TooManySteps { time, steps }.into());
-            }
-            left -= 1;
+            self.solver.limits.spend(&mut left, self.time().to_f64())?;
             self.advance_with_tangents(system, t_end, tangents, observer)?;
         }
         Ok(())
