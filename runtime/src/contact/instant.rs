@@ -1,5 +1,6 @@
 //! Impulses, or forces, of contacts at an instant: the problem and the memory for its solution.
 
+use super::assembly::{lines, symmetrize, Forces};
 use super::solver::eliminate;
 use super::{
     solve, Certificate, Contact, ContactError, Effort, Mode, Problem, RestitutionLaw, Touch, Touching, WithContacts,
@@ -27,6 +28,8 @@ pub(super) struct Touches<Y: Touching> {
     pub settles: Y::PerContact<bool>,
     pub a: Y::Delassus,
     pub b: Y::Delassus,
+    /// Inverse inertia along each of the lines that share a load.
+    own: Y::Delassus,
     pub impulses: Y::Delassus,
     pub work: Y::Delassus,
 }
@@ -55,6 +58,7 @@ impl<Y: Touching> Touches<Y> {
             settles: system.per_contact(false),
             a: system.zero_delassus(rows * rows),
             b: system.zero_delassus(rows),
+            own: system.zero_delassus(rows),
             impulses: system.zero_delassus(rows),
             work: system.zero_delassus(super::work_len(rows)),
         }
@@ -91,20 +95,31 @@ impl<Y: Touching> Touches<Y> {
     /// Inverse inertia of the contacts in the problem.
     pub fn assemble(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates) {
         let rows = self.rows();
-        let order = &self.order.as_ref()[..self.count];
-        system.inverse_inertia(t, q, order, self.open.as_ref(), &mut self.a.as_mut()[..rows * rows]);
+        let all = Forces { contacts: &self.order.as_ref()[..self.count], touches: None };
+        let a = &mut self.a.as_mut()[..rows * rows];
+        system.rest(t, q, self.open.as_ref());
+        system.responses((t, q), all, a, &mut []);
+        system.restore();
+        symmetrize(a, rows);
     }
 
-    /// Accelerations of the rows if no contact had a force, in `b`. With all rows of sticking contacts and the normal rows
-    /// of sliding ones held, the forces `f` keep them from accelerating, `b + A f = 0`.
-    pub fn free_accelerations(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates) {
-        let zero = Y::Scalar::zero();
+    /// Multipliers with all rows of sticking contacts and the normal rows of sliding ones held, without friction of the
+    /// latter.
+    fn hold(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates) {
         self.modes.as_mut().fill(Mode::Open);
         for (i, &k) in self.order.as_ref()[..self.count].iter().enumerate() {
             let slides = self.problem.as_ref()[i].slip.is_some();
             self.modes.as_mut()[k] = if slides { Mode::Slide } else { Mode::Stick };
         }
         system.hold(t, q, self.modes.as_ref());
+        self.modes.as_mut().fill(Mode::Open);
+    }
+
+    /// Accelerations of the rows if no contact had a force, in `b`. With all rows of sticking contacts and the normal rows
+    /// of sliding ones held, the forces `f` keep them from accelerating, `b + A f = 0`.
+    pub fn free_accelerations(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates) {
+        let zero = Y::Scalar::zero();
+        self.hold(system, t, q);
         let rows = self.rows();
         let (a, b) = (self.a.as_ref(), self.b.as_mut());
         b.fill(zero);
@@ -120,7 +135,6 @@ impl<Y: Touching> Touches<Y> {
                 column += 1;
             }
         }
-        self.modes.as_mut().fill(Mode::Open);
     }
 
     /// The problem of `a` and `b`, memory for its impulses, and for the solver.
@@ -151,9 +165,12 @@ impl<Y: Touching> Touches<Y> {
         solve(&problem, effort, forces, work)
     }
 
-    /// Forces of the closed contacts, in `impulses`, at the state that was looked at last, with the modes and directions of
-    /// slip as they are: they may be outside the cones. Contacts whose rows depend on one another share their load as
-    /// equally compliant ones would, in the limit of no compliance. `false` where there are no such forces.
+    /// Forces of the closed contacts at the state that was looked at last, with the modes and directions of slip as they
+    /// are: they may be outside the cones. Contacts whose rows depend on one another share their load as compliant ones
+    /// would, in the limit of no compliance. `false` where there are no such forces.
+    ///
+    /// They are in `impulses`, one for each of the [`lines`]: all of a contact that sticks, and the normal force of one that
+    /// slides, whose friction belongs to it.
     pub fn share(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates) -> bool {
         self.take_closed(system);
         for i in 0..self.count {
@@ -162,45 +179,46 @@ impl<Y: Touching> Touches<Y> {
                 self.problem.as_mut()[i].slip = Some(system.direction(k));
             }
         }
-        self.assemble(system, t, q);
-        self.free_accelerations(system, t, q);
+        self.hold(system, t, q);
+        let Touches { count, order, problem, .. } = self;
+        let shared = Forces { contacts: &order.as_ref()[..*count], touches: Some(&problem.as_ref()[..*count]) };
+        let n = lines(&system.system, shared).count();
+        system.rest(t, q, self.open.as_ref());
+        system.responses((t, q), shared, &mut self.a.as_mut()[..n * n], self.own.as_mut());
+        system.response_to_multipliers((t, q), shared, self.b.as_mut());
+        system.restore();
         self.impulses.as_mut().fill(Y::Scalar::zero());
-        (0..PASSES).all(|_| self.share_again())
+        (0..PASSES).all(|_| self.share_again(n))
     }
 
-    /// Improves the forces of [`Touches::share`].
-    fn share_again(&mut self) -> bool {
+    /// The contacts that share a load, for [`lines`].
+    pub fn sharing(&self) -> Forces<'_, Y::Scalar> {
+        Forces { contacts: self.order(), touches: Some(&self.problem.as_ref()[..self.count]) }
+    }
+
+    /// Improves the `n` forces of [`Touches::share`].
+    fn share_again(&mut self, n: usize) -> bool {
         let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
         let more = Y::Scalar::constant(COMPLIANCE);
-        let n = self.rows();
-        let (a, b, forces) = (self.a.as_ref(), self.b.as_ref(), self.impulses.as_mut());
         let (matrix, rest) = self.work.as_mut().split_at_mut(n * n);
         let rhs = &mut rest[..n];
-        for Touch { contact: c, slip } in &self.problem.as_ref()[..self.count] {
-            for row in c.row..c.row + c.rows() {
-                let own = a[row * n + row];
-                let line = &mut matrix[row * n..(row + 1) * n];
-                line.fill(zero);
-                match slip {
-                    Some(slip) if row > c.row => {
-                        line[row] = one;
-                        line[c.row] = c.friction * slip[row - c.row - 1];
-                        rhs[row] = zero;
-                    }
-                    _ if own > zero => {
-                        for (x, a) in line.iter_mut().zip(&a[row * n..]) {
-                            *x = *a / own;
-                        }
-                        line[row] = one + more;
-                        rhs[row] = more * forces[row] - b[row] / own;
-                    }
-                    // What cannot move has no force.
-                    _ => (line[row], rhs[row]) = (one, zero),
+        let forces = &mut self.impulses.as_mut()[..n];
+        let own = self.own.as_ref()[..n].iter().zip(self.b.as_ref()).zip(self.a.as_ref().chunks_exact(n));
+        for (row, ((&own, b), a)) in own.enumerate() {
+            let line = &mut matrix[row * n..(row + 1) * n];
+            line.fill(zero);
+            // What cannot move has no force.
+            (line[row], rhs[row]) = (one, zero);
+            if own > zero {
+                for (x, a) in line.iter_mut().zip(a) {
+                    *x = *a / own;
                 }
+                line[row] = line[row] + more;
+                rhs[row] = more * forces[row] - *b / own;
             }
         }
-        let found = eliminate(&mut matrix[..n * n], rhs);
-        forces[..n].copy_from_slice(rhs);
+        let found = eliminate(matrix, rhs);
+        forces.copy_from_slice(rhs);
         found
     }
 

@@ -135,8 +135,11 @@ where
 {
     /// At time `t` (s) and a state, with steps `step` of the method between events.
     ///
+    /// What touches at the start is resolved as in a motion by events. Where that fails, a motion that may choose begins by
+    /// time steps, as one by time steps always does.
+    ///
     /// # Errors
-    /// [`HybridError`], whatever the choice: what touches at the start is resolved as for a motion by events.
+    /// [`HybridError`].
     pub fn new(
         system: &mut WithContacts<Y>,
         (method, step): (M, Step),
@@ -149,7 +152,12 @@ where
             return Err(StepError::StepTooSmall { time: t.to_f64(), step: rules.step, error: 0.0 }.into());
         }
         let steps = TimeStepping::new(system, post_step);
-        let events = Hybrid::new(system, method, step, t, q, p)?;
+        let mut events = Hybrid::unsettled(system, method, step, t, (q, p))?;
+        let settled = match rules.choice {
+            RegimeChoice::TimeSteps => false,
+            RegimeChoice::Events => events.settle_modes(system, t, None).map(|()| true)?,
+            RegimeChoice::Automatic => events.settle_modes(system, t, None).is_ok(),
+        };
         let inner = system.system();
         let (kept, modes) = (inner.zero_momenta(), inner.per_contact(Mode::Open));
         let mut motion = ContactMotion {
@@ -166,7 +174,7 @@ where
             changes: 0,
             statistics: RegimeStatistics::default(),
         };
-        if rules.choice == RegimeChoice::TimeSteps {
+        if !settled {
             motion.begin_steps(system);
         }
         Ok(motion)

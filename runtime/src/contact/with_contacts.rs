@@ -5,6 +5,7 @@
 //! in the forces on the joints: the response of all normal forces to the friction of each sliding contact for `N = 1`
 //! comes from the momenta `−µ Φ_tᵀt̂` (one solve each), and a small linear system gives `N`.
 
+use super::assembly::lines;
 use super::instant::Touches;
 use super::touching::add_row;
 use super::{Contact, Effort, Mode, Touching};
@@ -352,16 +353,19 @@ impl<Y: Touching> WithContacts<Y> {
         let Some(mut instant) = self.instant.take() else { return false };
         let found = instant.share(self, t, q);
         if found {
-            self.at.forces.as_mut().fill([Y::Scalar::zero(); 3]);
-            for (touch, &k) in instant.problem.as_ref().iter().zip(instant.order()) {
-                let c = self.contact(k);
-                for i in 0..c.rows() {
-                    let force = instant.impulses.as_ref()[touch.contact.row + i];
-                    self.at.forces.as_mut()[k][i] = force;
-                    if i > 0 && touch.slip.is_some() {
-                        add_row(&self.system, &self.at.entries, c.row + i, force, &mut self.friction);
+            let zero = Y::Scalar::zero();
+            let (lambda, friction) = (self.at.lambda.as_mut(), &mut self.friction);
+            lambda.fill(zero);
+            for (line, force) in lines(&self.system, instant.sharing()).zip(instant.impulses.as_ref()) {
+                for (i, (row, force)) in line.forces(*force).enumerate() {
+                    lambda[row] = -force;
+                    if i > 0 {
+                        add_row(&self.system, &self.at.entries, row, force, friction);
                     }
                 }
+            }
+            for (force, c) in self.at.forces.as_mut().iter_mut().zip(self.system.contacts()) {
+                *force = core::array::from_fn(|i| if i < c.rows() { -lambda[c.row + i] } else { zero });
             }
         }
         self.instant = Some(instant);

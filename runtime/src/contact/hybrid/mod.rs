@@ -291,6 +291,22 @@ where
         q: &Y::Coordinates,
         p: &Y::Momenta,
     ) -> Result<Self, HybridError> {
+        let mut hybrid = Hybrid::unsettled(system, method, step, t, (q, p))?;
+        hybrid.settle_modes(system, t, None)?;
+        Ok(hybrid)
+    }
+
+    /// [`Hybrid::new`], but with all contacts open.
+    ///
+    /// # Errors
+    /// [`HybridError::Step`], [`HybridError::Overlap`].
+    pub(in crate::contact) fn unsettled(
+        system: &mut WithContacts<Y>,
+        method: M,
+        step: Step,
+        t: Y::Scalar,
+        (q, p): (&Y::Coordinates, &Y::Momenta),
+    ) -> Result<Self, HybridError> {
         let zero = Y::Scalar::zero();
         let solver = Solver::new(system, method, step, t, q, p)?;
         let inner = system.system();
@@ -316,7 +332,7 @@ where
             crowded: (t, 0),
             statistics: ContactStatistics::default(),
         };
-        hybrid.restart(system, t, q, p)?;
+        hybrid.place(system, t, q, p)?;
         Ok(hybrid)
     }
 
@@ -331,7 +347,21 @@ where
         q: &Y::Coordinates,
         p: &Y::Momenta,
     ) -> Result<(), HybridError> {
-        let zero = Y::Scalar::zero();
+        self.place(system, t, q, p)?;
+        self.settle_modes(system, t, None)
+    }
+
+    /// Takes a state, with all contacts open.
+    ///
+    /// # Errors
+    /// [`HybridError::Overlap`].
+    fn place(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+    ) -> Result<(), HybridError> {
         system.open_all();
         self.q.as_mut().copy_from_slice(q.as_ref());
         self.p.as_mut().copy_from_slice(p.as_ref());
@@ -342,8 +372,7 @@ where
                 return Err(HybridError::Overlap { contact: k, gap });
             }
         }
-        self.departures.as_mut().fill(Departure { time: t, speed: zero });
-        self.settle_modes(system, t, None)?;
+        self.departures.as_mut().fill(Departure { time: t, speed: Y::Scalar::zero() });
         Ok(())
     }
 

@@ -67,7 +67,7 @@ where
 
     /// Impulses and modes of the contacts that touch at the state that was looked at last, which is in `self.q` and
     /// `self.p`; the motion starts again from there.
-    pub(super) fn settle_modes(
+    pub(in crate::contact) fn settle_modes(
         &mut self,
         system: &mut WithContacts<Y>,
         t: Y::Scalar,
