@@ -23,6 +23,8 @@ pub enum Experiment {
     Biped(BipedArgs),
     /// A chain of 100 links of which a joint breaks: table 7.5, figure 7.16, conservation, accuracy
     Breaking(BreakingArgs),
+    /// Boxes and legs that are thrown on the floor: events, errors, gaps, energy
+    Drops(DropsArgs),
     /// Time of an evaluation over the number of links of open, branched and closed chains: figures 7.4 to 7.6
     Scaling(ScalingArgs),
 }
@@ -53,6 +55,20 @@ pub struct BreakingArgs {
     /// Time to which the motion is compared with double-double numbers, s; 10 s take minutes, 0 leaves it out
     #[arg(long, value_name = "S", default_value_t = 10.0)]
     pub end: f64,
+}
+
+/// `mbd-lab experiments drops`.
+#[derive(Args)]
+pub struct DropsArgs {
+    /// Throws of each mechanism; a hundred thousand take hours
+    #[arg(long, value_name = "N", default_value_t = 1_000)]
+    pub count: u64,
+    /// Only this mechanism: box or leg
+    #[arg(long, value_name = "NAME")]
+    pub only: Option<String>,
+    /// Start of the random numbers
+    #[arg(long, value_name = "N", default_value_t = 7)]
+    pub seed: u64,
 }
 
 /// `mbd-lab experiments scaling`.

@@ -4,6 +4,7 @@
 mod biped;
 mod breaking;
 mod clock;
+mod drops;
 mod forms;
 mod mechanism;
 mod plain;
@@ -25,6 +26,7 @@ pub fn run(args: &ExperimentsArgs, out: &mut dyn Write) -> Outcome {
     match &args.experiment {
         Experiment::Biped(args) => biped::run(args, out),
         Experiment::Breaking(args) => breaking::run(args, out),
+        Experiment::Drops(args) => drops::run(args, out),
         Experiment::Scaling(args) => scaling::run(args, out),
     }
 }

@@ -233,6 +233,15 @@ fn the_command_measures_scaling() {
 }
 
 #[test]
+fn thrown_boxes_come_to_the_floor_and_stay_above_it() {
+    let text = out(&good(run(&["experiments", "drops", "--count", "3", "--only", "box"]))).to_string();
+    let row = cells(&text, "3 throws of each", "box");
+    // Throws, those that were followed to the end, typed errors, those of them with time steps, silent failures.
+    assert_eq!(row[2..7], ["3", "3", "0", "0", "0"], "{text}");
+    bad(run(&["experiments", "drops", "--only", "cat"]), &["no such mechanism", "take box or leg"]);
+}
+
+#[test]
 fn the_interpreter_is_called() {
     let mechanism = ["interpreter", "--mechanisms", "double_pendulum", "--calls", "3"];
     assert_eq!(out(&good(run(&mechanism))), "");

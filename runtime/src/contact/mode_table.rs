@@ -218,6 +218,9 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
 
     fn act(&mut self, modes: &[Mode]) {
         let before = self.current;
+        if self.modes[before].0 == modes {
+            return;
+        }
         self.current = match self.modes.iter().position(|(known, _)| known == modes) {
             Some(k) => k,
             None => {
