@@ -116,7 +116,7 @@ struct Tally {
     /// Motions that failed by events, by their reason; those of them that went to the end with time steps in between.
     failures: BTreeMap<&'static str, (u64, u64)>,
     /// Failures that are no typed errors: a number that is not finite, a body below the floor, energy gained.
-    silent: u64,
+    silent: Vec<String>,
     events: u64,
     evaluations: u64,
     /// Least gap, m (rad for stops), of motions by events; largest relative residual of an impact; energy gained beside
@@ -163,7 +163,7 @@ pub fn run(args: &DropsArgs, out: &mut dyn Write) -> Outcome {
             (tally.throws - failed).to_string(),
             failed.to_string(),
             stepped.to_string(),
-            tally.silent.to_string(),
+            tally.silent.len().to_string(),
             each(tally.events as f64),
             each(tally.evaluations as f64),
             each(1e3 * tally.seconds),
@@ -175,6 +175,7 @@ pub fn run(args: &DropsArgs, out: &mut dyn Write) -> Outcome {
         for (reason, (count, _)) in &tally.failures {
             reasons += &format!("- {name}: {count} × {reason}\n");
         }
+        tally.silent.iter().for_each(|what| reasons += &format!("- {name}: {what}\n"));
     }
     writeln!(out, "{text}\n{reasons}")?;
     Ok(())
@@ -251,9 +252,19 @@ fn follow(
         tally.least = tally.least.min(watch.least);
         tally.residual = tally.residual.max(happened.residual);
         tally.gained = tally.gained.max(gained);
-        tally.silent += u64::from(!(watch.finite && watch.least > BELOW && gained < GAINED));
-    } else {
-        tally.silent += u64::from(!(watch.finite && kinetic + potential < above));
+        if !(watch.finite && watch.least > BELOW && gained < GAINED) {
+            let (k, ended) = (tally.throws, result.map_or_else(|e| e.to_string(), |()| "it runs to the end".into()));
+            let numbers = if watch.finite { "" } else { ", numbers that are not finite" };
+            let silent =
+                format!("throw {k}: least gap {:.1e} m, energy gained {gained:.1e}{numbers}; {ended}", watch.least);
+            tally.silent.push(silent);
+        }
+    } else if !(watch.finite && kinetic + potential < above) {
+        tally.silent.push(format!(
+            "throw {} with time steps: energy {:.1e}",
+            tally.throws,
+            kinetic + potential - above
+        ));
     }
     result
 }

@@ -176,12 +176,13 @@ where
             }
             // The bodies have come back with about the speed with which they departed.
             let acceleration = (speed + approach) / (t - time);
-            let height = approach * approach / (two * acceleration);
+            let contact = &mut self.touching.problem.as_mut()[i].contact;
+            let e = contact.restitution;
+            // The bounce that would follow.
+            let height = e * approach * (e * approach) / (two * acceleration);
             if !(height.to_f64() < self.rules.bounce) {
                 continue;
             }
-            let contact = &mut self.touching.problem.as_mut()[i].contact;
-            let e = contact.restitution;
             contact.restitution = zero;
             self.touching.settles.as_mut()[k] = true;
             self.settling = acceleration;

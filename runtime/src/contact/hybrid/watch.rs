@@ -269,10 +269,35 @@ where
         let mut start = (from, at_a);
         if !(at_a > zero) {
             // The function starts on zero, and has been positive since if it is an event.
-            start = self.positive(system, k, (from, end.0), value)?;
+            start = match self.positive(system, k, (from, end.0), value) {
+                Some(start) => start,
+                None if mode == Mode::Open => return self.sinks(system, k, (from, at_a), end),
+                None => return None,
+            };
         }
         let theta = self.root(system, k, start, end, value);
         Some(Found { contact: k, cause, theta })
+    }
+
+    /// The landing of an open contact whose gap has not been positive since the stretch began, at `start`, and is smaller at
+    /// its `end`: its last bounce was lower than what can be told from zero. It lands where the gap is again what it was.
+    fn sinks(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        k: usize,
+        start: (Y::Scalar, Y::Scalar),
+        end: (Y::Scalar, Y::Scalar),
+    ) -> Option<Found<Y::Scalar>> {
+        let least = Y::Scalar::constant(OVERLAP[0]);
+        if !(start.1 - end.1 > least) {
+            return None;
+        }
+        let above = |w: &Watched<Y::Scalar>| w.first - start.1;
+        let theta = match self.positive(system, k, (start.0, end.0), above) {
+            Some(risen) => self.root(system, k, risen, (end.0, end.1 - start.1), above),
+            None => start.0,
+        };
+        Some(Found { contact: k, cause: Cause::Landed, theta })
     }
 
     /// A point within a stretch where a function is positive, with its value.
