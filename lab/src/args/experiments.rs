@@ -63,6 +63,9 @@ pub struct DropsArgs {
     /// Throws of each mechanism; a hundred thousand take hours
     #[arg(long, value_name = "N", default_value_t = 1_000)]
     pub count: u64,
+    /// Number of the first throw
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub first: u64,
     /// Only this mechanism: box or leg
     #[arg(long, value_name = "NAME")]
     pub only: Option<String>,

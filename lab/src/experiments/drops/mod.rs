@@ -154,7 +154,7 @@ pub fn run(args: &DropsArgs, out: &mut dyn Write) -> Outcome {
         return Err(Failure::new(format!("--only {only}: no such mechanism"), "take box or leg"));
     }
     for (name, model) in MECHANISMS.into_iter().filter(|(name, _)| chosen(name)) {
-        let tally = throws(name, model, args.count, args.seed)?;
+        let tally = throws(name, model, args)?;
         let (failed, stepped) = tally.failures.values().fold((0, 0), |(a, b), (x, y)| (a + x, b + y));
         let each = |total: f64| format!("{:.1}", total / tally.throws as f64);
         let cells = [
@@ -182,21 +182,23 @@ pub fn run(args: &DropsArgs, out: &mut dyn Write) -> Outcome {
 }
 
 /// The throws of a mechanism.
-fn throws(name: &str, text: &str, count: u64, seed: u64) -> Outcome<Tally> {
+fn throws(name: &str, text: &str, args: &DropsArgs) -> Outcome<Tally> {
     let failed = |error: &dyn std::fmt::Display| Failure::new(error.to_string(), "report this: the model is built in");
     let model = read::model(&format!("{name}.toml"), text, &ImportOptions::default()).map_err(|e| failed(&e))?.model;
     let plan = Plan::new(&model, 1e-9);
     let options = Options { arithmetic: Arithmetic::Exact, ..Options::default() };
     let mechanism = plan.compiled_with_contacts(&options, Compiled::<f64>::WORTHWHILE).map_err(|e| failed(&e))?;
     let mut system = WithContacts::new(mechanism);
-    let mut random = Random(seed);
+    let mut random = Random(args.seed);
     let mut tally = Tally { least: f64::INFINITY, ..Tally::default() };
     let (clock, mut told) = (Instant::now(), Instant::now());
-    for k in 0..count {
-        throw(&mut system, &Throw::new(&mut random, (plan.dims.nq, plan.dims.nv)), &mut tally);
+    let mut next = || Throw::new(&mut random, (plan.dims.nq, plan.dims.nv));
+    (1..args.first).for_each(|_| drop(next()));
+    for k in 0..args.count {
+        throw(&mut system, &next(), &mut tally);
         if told.elapsed() > Duration::from_secs(10) {
             told = Instant::now();
-            note(format_args!("{name}: {} of {count} throws", k + 1));
+            note(format_args!("{name}: {} of {} throws", k + 1, args.count));
         }
     }
     tally.seconds = clock.elapsed().as_secs_f64();
