@@ -9,7 +9,7 @@ use multibody::codegen::{self, c, wasm, GenerateError, Options};
 use super::args::{GenerateArgs, Language};
 #[cfg(feature = "fmu")]
 use super::fmu;
-use super::output::{write_file, write_files};
+use super::output::{write_files, write_result};
 use super::{modes, source, Failure, Outcome};
 
 /// Runs `mbd generate`: prints the code or writes it to files.
@@ -44,10 +44,7 @@ pub fn run(args: &GenerateArgs, out: &mut dyn Write) -> Outcome {
     }
     let generated = codegen::generate(&model, &base).map_err(failure)?;
     source::tell_notices(path, &generated.notices);
-    match file {
-        Some(file) => write_file(file, &generated.source),
-        None => Ok(out.write_all(generated.source.as_bytes())?),
-    }
+    write_result(file, &generated.source, out)
 }
 
 /// Options of the generator.

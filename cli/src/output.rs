@@ -4,6 +4,7 @@ use std::fmt::{Arguments, Display};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use super::{Failure, Outcome};
@@ -32,6 +33,14 @@ pub fn mentioned<R>(what: impl Display + Sync, work: impl FnOnce() -> R) -> R {
     })
 }
 
+/// Writes a result to a file, or to standard output where no file is named or its name is `-`.
+pub fn write_result(file: Option<&Path>, content: &str, out: &mut dyn Write) -> Outcome {
+    match file.filter(|file| *file != Path::new("-")) {
+        Some(file) => write_file(file, content),
+        None => Ok(out.write_all(content.as_bytes())?),
+    }
+}
+
 /// Writes a file through a temporary file in the same directory, so that it is either complete or unchanged.
 pub fn write_file(path: &Path, content: &str) -> Outcome {
     write_files(&[(path, content)])
@@ -44,6 +53,10 @@ pub fn write_files<C: AsRef<[u8]>>(files: &[(&Path, C)]) -> Outcome {
         writable(path)?;
         // A link stays a link, and a pipe or terminal cannot be the target of a rename.
         let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        if written.iter().any(|(_, other, _)| *other == target) {
+            let what = format!("cannot write `{}`: two outputs have this name", path.display());
+            return Err(Failure::new(what, "name a file of its own for each of them"));
+        }
         if target.exists() && !target.is_file() {
             return std::fs::write(&target, content).map_err(|e| failure(path, &e));
         }
@@ -61,8 +74,24 @@ pub fn write_files<C: AsRef<[u8]>>(files: &[(&Path, C)]) -> Outcome {
     result
 }
 
-/// Checks whether a file can be written, before its contents are computed.
+/// The files that this process has read as its input.
+static READ: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Remembers that a file is input, so that it is not overwritten.
+pub fn is_input(path: &Path) {
+    if let Ok(path) = std::fs::canonicalize(path) {
+        READ.lock().unwrap_or_else(PoisonError::into_inner).push(path);
+    }
+}
+
+/// Checks whether a file can be written, before its contents are computed. What was read as input is not.
 pub fn writable(path: &Path) -> Outcome {
+    let target = std::fs::canonicalize(path).ok().filter(|target| target.is_file());
+    let read = READ.lock().unwrap_or_else(PoisonError::into_inner);
+    if target.is_some_and(|target| read.contains(&target)) {
+        let what = format!("cannot write `{}`: it is the input of this command", path.display());
+        return Err(Failure::new(what, "name another file for the output"));
+    }
     if path.is_dir() {
         return Err(Failure::new(format!("cannot write `{}`: it is a directory", path.display()), "name a file in it"));
     }

@@ -13,7 +13,7 @@ use multibody::codegen::words;
 use multibody::runtime::interp::MassMatrixError;
 
 use super::args::ModelArgs;
-use super::output::{mentioned, note};
+use super::output::{is_input, mentioned, note};
 use super::{Failure, Outcome};
 
 /// Largest size of a file, bytes. No description of a mechanism is as long, but a device file may be endless.
@@ -22,6 +22,7 @@ const LONGEST: u64 = 256 << 20;
 /// Reads the text of a file.
 pub fn read(path: &Path) -> Outcome<String> {
     let file = path.display();
+    is_input(path);
     let mut bytes = Vec::new();
     let read = std::fs::File::open(path).and_then(|f| f.take(LONGEST + 1).read_to_end(&mut bytes));
     if let Err(e) = read {
@@ -114,10 +115,19 @@ pub fn plan(args: &ModelArgs, options: PlanOptions) -> Outcome<Plan> {
     Ok(chosen(args, options)?.plan)
 }
 
+/// Notices of a plan that are told one by one; of more, only the number.
+const NOTICES: usize = 5;
+
 /// Reports the notices of a plan.
 pub fn tell_notices(path: &Path, notices: &[String]) {
-    for notice in notices {
-        note(format_args!("{}: notice: {notice}", path.display()));
+    let file = path.display();
+    for notice in notices.iter().take(NOTICES) {
+        note(format_args!("{file}: notice: {notice}"));
+    }
+    if let more @ 1.. = notices.len().saturating_sub(NOTICES) {
+        note(format_args!(
+            "{file}: notice: {more} more of such notices (`--snap 0` of `mbd generate` keeps every number)"
+        ));
     }
 }
 

@@ -12,7 +12,7 @@ use multibody::runtime::{Constrained, Interpreter};
 use serde::Serialize;
 
 use super::args::{EvalArgs, Quantity};
-use super::output::{note, write_file};
+use super::output::{note, write_result};
 use super::{condition, loops, source, Failure, Outcome};
 use input::{Inputs, State};
 use outer::Outer;
@@ -91,10 +91,7 @@ pub fn run(args: &EvalArgs, out: &mut dyn Write) -> Outcome {
         Failure::Message(what, help) => Failure::new(format!("{name}: states[{state}]: {what}"), help),
         other => other,
     })?;
-    match &args.output {
-        Some(file) => write_file(file, &text),
-        None => Ok(out.write_all(text.as_bytes())?),
-    }
+    write_result(args.output.as_deref(), &text, out)
 }
 
 fn standard_input() -> Outcome<String> {

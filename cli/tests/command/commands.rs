@@ -413,3 +413,59 @@ fn base_parameters_are_named() {
     let names = "shoulder_link.m, shoulder_link.mx, shoulder_link.my, shoulder_link.mz";
     assert!(text.contains(&format!("\nwithout effect: {names}, ")), "{text}");
 }
+
+#[test]
+fn inputs_are_not_overwritten() {
+    let folder = folder("overwrite");
+    let text = std::fs::read_to_string(format!("{ROOT}/models/double_pendulum.toml")).expect("the model");
+    let states = r#"{"states": [{"q": [0.1, 0.2], "v": [0, 0]}]}"#;
+    write(&folder, "m.toml", &text);
+    write(&folder, "s.json", states);
+    for arguments in [
+        &["generate", "m.toml", "-o", "m.toml"][..],
+        &["simulate", "m.toml", "--time", "0.1", "--csv", "m.toml"],
+        &["simulate", "m.toml", "--time", "0.1", "--svg", "../cli_overwrite/m.toml"],
+        &["eval", "m.toml", "-i", "s.json", "-o", "s.json"],
+    ] {
+        bad(run_in(&folder, arguments), &["cannot write", "it is the input of this command"]);
+    }
+    assert_eq!(read(&folder, "m.toml"), text);
+    assert_eq!(read(&folder, "s.json"), states);
+    assert_eq!(files(&folder), ["m.toml", "s.json"]);
+    // A dash is standard output.
+    let code = good(run_in(&folder, &["generate", "m.toml", "-o", "-"]));
+    assert!(out(&code).contains("pub fn rates") || out(&code).contains("fn rates"), "{}", out(&code));
+    assert_eq!(files(&folder), ["m.toml", "s.json"]);
+}
+
+/// A robot of one joint whose link carries an antenna of one milligram.
+fn with_antenna(antenna: &str) -> String {
+    format!(
+        "<robot name='连杆'><link name='base'/><link name='臂'><inertial><mass value='2'/><origin xyz='0 0 0.3'/>\
+         <inertia ixx='0.02' iyy='0.02' izz='0.01' ixy='0' ixz='0' iyz='0'/></inertial></link>\
+         <link name='antenna'><inertial><mass value='1e-6'/>\
+         <inertia ixx='-1e-7' iyy='1e-7' izz='1e-7' ixy='0' ixz='0' iyz='0'/></inertial></link>\
+         <joint name='j' type='continuous'><parent link='base'/><child link='臂'/><axis xyz='0 1 0'/></joint>\
+         <joint name='a' type='{antenna}'><parent link='臂'/><child link='antenna'/><axis xyz='0 1 0'/></joint></robot>"
+    )
+}
+
+#[test]
+fn robots_of_others_are_judged_by_what_moves() {
+    let folder = folder("others");
+    // The antenna is fixed: what moves has a sound inertia. A declaration after blank lines, names in any script.
+    write(&folder, "fixed.urdf", &format!("\n\n<?xml version=\"1.0\"?>\n{}", with_antenna("fixed")));
+    let output = good(run_in(&folder, &["check", "fixed.urdf"]));
+    for text in [
+        "fixed.urdf:3:1: warning: the XML declaration does not stand at the start",
+        "warning: inertia of `antenna` has a negative moment; together with what is fixed to it, it is sound",
+        "model `连杆` is called `u8fde_u6746` in generated code",
+    ] {
+        assert!(err(&output).contains(text), "{text}: {}", err(&output));
+    }
+    assert!(out(&output).contains("2 fixed"), "{}", out(&output));
+    let code = good(run_in(&folder, &["generate", "fixed.urdf", "--outputs", "rates"]));
+    assert!(out(&code).contains("pub struct U8fdeU6746"), "{}", out(&code));
+    write(&folder, "moving.urdf", &with_antenna("continuous"));
+    bad(run_in(&folder, &["check", "moving.urdf"]), &["error: inertia of `antenna` has a negative moment\n"]);
+}

@@ -1,13 +1,13 @@
 //! Bodies: masses, inertias, sizes.
 
-use super::is_zero;
 use super::numbers::{Numbers, Quantity};
 use super::symmetric::eigenvalues;
+use super::{is_zero, merged};
 use crate::diag::Severity;
 use crate::import::raw::{RawBody, RawModel};
-use crate::import::source::Span;
+use crate::import::source::Findings;
 use crate::import::words::quote;
-use crate::model::{Body, Joint, Rotation, Value};
+use crate::model::{Body, Joint, Param, Rotation, Value};
 use crate::rounded_once::norm;
 
 /// Slack of the triangle inequality and of positivity, relative to the largest moment: numbers written with seven
@@ -52,55 +52,64 @@ pub(super) fn body(raw: &RawBody, numbers: &mut Numbers) -> Body {
     }
 }
 
-/// Judges the inertia of every body, at the defaults of the parameters.
-pub(super) fn inertias(raw: &RawModel, bodies: &[Body], numbers: &mut Numbers) {
-    for (source, body) in raw.bodies.iter().zip(bodies) {
+/// Judges the inertia of every body, at the defaults of the parameters. What is fixed to other bodies moves with them as
+/// one: where that one is sound, a part that is not is warned about. Joints stand depth first; without them, every body
+/// is judged alone.
+pub(super) fn inertias(raw: &RawModel, bodies: &[Body], joints: &[Joint], params: &[Param], findings: &mut Findings) {
+    let together = merged::together(bodies, joints, params);
+    for ((source, body), together) in raw.bodies.iter().zip(bodies).zip(together) {
         let Some(at) = &source.inertia else { continue };
-        let entries = body.inertia.map(|v| numbers.at_default(v));
+        let entries = body.inertia.map(|v| merged::at_default(v, params));
         let Some(moments) = eigenvalues(entries) else { continue };
+        let mass = merged::at_default(body.mass, params);
         let by_default = body.inertia.iter().any(|v| v.constant().is_none());
-        let mass = numbers.at_default(body.mass);
-        inertia(&body.name, mass, entries, moments, by_default, raw.lenient, at.span, numbers);
+        let suffix = if by_default { ", with the defaults of its parameters" } else { "" };
+        let Some((fault, severity)) = fault(&body.name, mass, entries, moments, raw.lenient, suffix) else { continue };
+        let is_sound = match together {
+            None => true,
+            Some((mass, entries)) => eigenvalues(entries).is_some_and(|moments| is_sound(mass, moments)),
+        };
+        let severity = match severity {
+            Severity::Error if is_sound => {
+                let message = format!("{}; together with what is fixed to it, it is sound", fault.0);
+                findings.add(Severity::Warning, at.span, message, fault.1);
+                continue;
+            }
+            // What a parameter may still change is no error.
+            Severity::Error if by_default => Severity::Warning,
+            severity => severity,
+        };
+        findings.add(severity, at.span, fault.0, fault.1);
     }
 }
 
-fn inertia(
+/// Whether moments of inertia, in rising order, are those of a body, as far as few digits tell.
+fn is_sound(mass: f64, [small, middle, large]: [f64; 3]) -> bool {
+    mass > 0.0 && large > 0.0 && small >= -ROUNDING * large && large - middle - small <= FEW_DIGITS * large
+}
+
+/// What is wrong with an inertia, and what to do.
+fn fault(
     name: &str,
     mass: f64,
     entries: [f64; 6],
     moments: [f64; 3],
-    by_default: bool,
     lenient: bool,
-    span: Span,
-    numbers: &mut Numbers,
-) {
+    suffix: &str,
+) -> Option<((String, &'static str), Severity)> {
     let [small, middle, large] = moments;
     let scale = large.max(-small);
     let diagonal = entries[3..].iter().all(|x| *x == 0.0);
-    let suffix = if by_default { ", with the defaults of its parameters" } else { "" };
-    // What a parameter may still change is no error.
-    let error = if by_default { Severity::Warning } else { Severity::Error };
     // Below what a body of a millimetre has, and far below, the entries are some program's rounding errors.
     if small < -ROUNDING * scale.max(mass * 1e-6) {
         // In files of others, what a body of a centimetre has does not keep the robot from moving.
-        let error = if lenient && -small < mass * 1e-4 { Severity::Warning } else { error };
-        let (message, help) = if entries[..3].iter().any(|x| *x < 0.0) {
-            (
-                format!("inertia of {} has a negative moment{suffix}", quote(name)),
-                "moments of inertia are sums of m r² and cannot be negative",
-            )
-        } else {
-            (
-                format!("inertia of {} is not positive: its smallest principal moment is {}{suffix}", quote(name), short(small)),
-                "the products are too large for the moments: check units and signs (products are entries of the matrix)",
-            )
-        };
-        numbers.findings.add(error, span, message, help);
-        return;
+        let is_small = lenient && -small < mass * 1e-4;
+        let severity = if is_small { Severity::Warning } else { Severity::Error };
+        return Some((negative(name, entries, small, suffix), severity));
     }
     let excess = (large - middle - small) / scale;
     if excess.is_nan() || excess <= ROUNDING {
-        return;
+        return None;
     }
     let why = if diagonal {
         let axis = (0..3).max_by(|a, b| entries[*a].total_cmp(&entries[*b])).unwrap_or(2);
@@ -109,17 +118,29 @@ fn inertia(
         format!("principal moments {} + {} < {}", short(small), short(middle), short(large))
     };
     if excess <= FEW_DIGITS {
-        let message = format!(
-            "inertia of {} violates the triangle inequality by {} % ({why}){suffix}",
-            quote(name),
-            short(100.0 * excess)
-        );
-        numbers.findings.warning(span, message, "write the moments with more digits");
-    } else {
-        let message = format!("inertia of {} violates the triangle inequality ({why}){suffix}", quote(name));
-        let help = "no body has such moments: check their units, and that they are about the centre of mass";
-        numbers.findings.add(if lenient { Severity::Warning } else { error }, span, message, help);
+        let percent = short(100.0 * excess);
+        let message =
+            format!("inertia of {} violates the triangle inequality by {percent} % ({why}){suffix}", quote(name));
+        return Some(((message, "write the moments with more digits"), Severity::Warning));
     }
+    let message = format!("inertia of {} violates the triangle inequality ({why}){suffix}", quote(name));
+    let help = "no body has such moments: check their units, and that they are about the centre of mass";
+    Some(((message, help), if lenient { Severity::Warning } else { Severity::Error }))
+}
+
+/// The fault of an inertia that is not positive, and what to do.
+fn negative(name: &str, entries: [f64; 6], small: f64, suffix: &str) -> (String, &'static str) {
+    if entries[..3].iter().any(|x| *x < 0.0) {
+        let message = format!("inertia of {} has a negative moment{suffix}", quote(name));
+        return (message, "moments of inertia are sums of m r² and cannot be negative");
+    }
+    let message = format!(
+        "inertia of {} is not positive: its smallest principal moment is {}{suffix}",
+        quote(name),
+        short(small)
+    );
+    let help = "the products are too large for the moments: check units and signs (products are entries of the matrix)";
+    (message, help)
 }
 
 /// Four digits of a number.

@@ -1,27 +1,14 @@
 //! Freedoms that nothing resists: they make the mass matrix singular.
 
-use mbd_runtime::Scalar;
-
-use super::symmetric::full;
+use super::merged::{apply, at_default, cross, dot, moved, own, sum, trace, transpose, unit, Inertia, Mat3};
 use crate::import::raw::RawModel;
 use crate::import::source::Findings;
 use crate::import::words::quote;
-use crate::model::{Body, Freedom, JointKind, JointMotion, Model, Placement, Rotation, Unit, Value};
-use crate::rounded_once::norm;
-
-pub(super) type Mat3 = [[f64; 3]; 3];
+use crate::model::{Body, Freedom, JointKind, JointMotion, Model, Param, Unit, Value};
 
 /// Below this fraction of the body's largest moment (or of its mass) an inertia is taken for rounding: 1.5708 for pi/2
 /// leaves 1e-11.
 const NOTHING: f64 = 1e-10;
-
-/// Mass, first moment and inertia about the origin, in the axes of one frame.
-#[derive(Clone, Copy, Default)]
-struct Inertia {
-    mass: f64,
-    first: [f64; 3],
-    about_origin: Mat3,
-}
 
 /// Reports free joints that carry nothing heavy, and leaves that do not resist one of their freedoms. `order` gives the
 /// file index of each joint.
@@ -42,7 +29,7 @@ pub(super) fn leaves(raw: &RawModel, order: &[usize], model: &Model, findings: &
     let mut heavy: Vec<bool> = model.joints.iter().map(|j| is_heavy(&model.bodies[j.child])).collect();
     let mut moving = vec![false; n];
     let mut reported = vec![false; n];
-    let mut inertia: Vec<Option<Inertia>> = model.joints.iter().map(|j| own(&model.bodies[j.child], model)).collect();
+    let mut inertia: Vec<Option<Inertia>> = model.joints.iter().map(|j| constant(&model.bodies[j.child])).collect();
     for k in (0..n).rev() {
         let joint = &model.joints[k];
         let nv = joint.kind.nv();
@@ -63,7 +50,7 @@ pub(super) fn leaves(raw: &RawModel, order: &[usize], model: &Model, findings: &
         // One report per massless branch is enough.
         reported[parent] |= reported[k] && !heavy[k];
         inertia[parent] = match (inertia[parent], inertia[k]) {
-            (Some(a), Some(b)) => Some(sum(a, moved(b, &joint.placement, model))),
+            (Some(a), Some(b)) => Some(sum(a, moved(b, &joint.placement, &model.params))),
             _ => None,
         };
     }
@@ -83,8 +70,8 @@ fn weak_freedom(model: &Model, k: usize, heavy: bool, moving: bool, inertia: Opt
     if matches!(joint.kind.axes(), [a, b] if super::joints::parallel(*a, *b)) {
         return None; // reported as that
     }
-    let columns = freedoms(&joint.kind, model);
-    let armature: Vec<f64> = joint.armature.iter().map(|a| at_default(*a, model)).collect();
+    let columns = freedoms(&joint.kind, &model.params);
+    let armature: Vec<f64> = joint.armature.iter().map(|a| at_default(*a, &model.params)).collect();
     let resists = resistance(&inertia, &columns, &armature);
     let scale = |unit: Unit| if unit == Unit::Radian { trace(&inertia.about_origin) } else { inertia.mass };
     let freedoms = joint.kind.spec().freedoms;
@@ -99,52 +86,15 @@ fn is_heavy(body: &Body) -> bool {
     body.mass != Value::ZERO || body.inertia.iter().any(|x| *x != Value::ZERO)
 }
 
-fn at_default(value: Value, model: &Model) -> f64 {
-    match value {
-        Value::Const(x) => x,
-        Value::Param(k) => model.params[k].default,
-    }
-}
-
 /// Inertia of a body in its own frame; `None` if a parameter has a say in it.
-fn own(body: &Body, model: &Model) -> Option<Inertia> {
-    let mass = body.mass.constant()?;
-    let mut com = [0.0; 3];
-    for (slot, x) in com.iter_mut().zip(body.com) {
-        *slot = x.constant()?;
-    }
-    let mut entries = [0.0; 6];
-    for (slot, x) in entries.iter_mut().zip(body.inertia) {
-        *slot = x.constant()?;
-    }
-    let r = matrix(&body.inertia_axes, &|x| at_default(x, model));
-    let about_com = multiply(&multiply(&r, &full(entries)), &transpose(&r));
-    Some(Inertia { mass, first: com.map(|x| mass * x), about_origin: add(about_com, steiner(mass, com, com)) })
-}
-
-/// The inertia seen from the parent frame, at zero coordinates (used for fixed joints only).
-fn moved(i: Inertia, placement: &Placement, model: &Model) -> Inertia {
-    let r = matrix(&placement.rotation, &|x| at_default(x, model));
-    let d = placement.xyz.map(|x| at_default(x, model));
-    let first = apply(&r, i.first);
-    let turned = multiply(&multiply(&r, &i.about_origin), &transpose(&r));
-    // About d + x: I + (d, h) + (h, d) + m (d, d).
-    let mixed = add(steiner(1.0, d, first), steiner(1.0, first, d));
-    let about_origin = add(add(turned, mixed), steiner(i.mass, d, d));
-    Inertia { mass: i.mass, first: [0, 1, 2].map(|k| first[k] + i.mass * d[k]), about_origin }
-}
-
-fn sum(a: Inertia, b: Inertia) -> Inertia {
-    Inertia {
-        mass: a.mass + b.mass,
-        first: [0, 1, 2].map(|k| a.first[k] + b.first[k]),
-        about_origin: add(a.about_origin, b.about_origin),
-    }
+fn constant(body: &Body) -> Option<Inertia> {
+    let numbers = body.com.iter().chain(&body.inertia).chain([&body.mass]);
+    numbers.fold(true, |all, x| all && x.constant().is_some()).then(|| own(body, &[]))
 }
 
 /// Velocity and angular velocity of the child frame per unit of each freedom, at zero coordinates. Of the directions
 /// across an axis any two will do: the mass is the same along all.
-fn freedoms(kind: &JointKind, model: &Model) -> Vec<([f64; 3], [f64; 3])> {
+fn freedoms(kind: &JointKind, params: &[Param]) -> Vec<([f64; 3], [f64; 3])> {
     const AXES: Mat3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut columns = Vec::new();
     for (element, axis) in kind.elements() {
@@ -154,7 +104,7 @@ fn freedoms(kind: &JointKind, model: &Model) -> Vec<([f64; 3], [f64; 3])> {
             let a = unit(cross(n, AXES[k]));
             [a, cross(n, a), n]
         });
-        let element = element.map(&mut |value| at_default(value, model));
+        let element = element.map(&mut |value| at_default(value, params));
         let outer = |v: [f64; 3]| apply(&transpose(&axes), v);
         columns.extend((0..element.nv()).map(|k| element.axis(k).motion(1.0)).map(|e| (outer(e.lin), outer(e.ang))));
     }
@@ -193,62 +143,4 @@ fn resistance(i: &Inertia, columns: &[([f64; 3], [f64; 3])], armature: &[f64]) -
         }
     }
     pivots
-}
-
-/// The matrix of a rotation whose numbers have the values that `at` gives.
-pub(super) fn matrix(rotation: &Rotation, at: &dyn Fn(Value) -> f64) -> Mat3 {
-    let about = |axis: [f64; 3], angle: f64| {
-        let (s, c) = Scalar::sin_cos(angle);
-        let [x, y, z] = axis;
-        let skew = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
-        let one = |i: usize, j: usize| f64::from(u8::from(i == j));
-        [0, 1, 2].map(|i| [0, 1, 2].map(|j| c * one(i, j) + s * skew[i][j] + (1.0 - c) * axis[i] * axis[j]))
-    };
-    match rotation {
-        Rotation::AxisAngle { axis, angle } => about(unit(*axis), at(*angle)),
-        Rotation::Rpy(rpy) => {
-            let [roll, pitch, yaw] = rpy.map(at);
-            let zy = multiply(&about([0.0, 0.0, 1.0], yaw), &about([0.0, 1.0, 0.0], pitch));
-            multiply(&zy, &about([1.0, 0.0, 0.0], roll))
-        }
-    }
-}
-
-/// `m (a·b 1 - b aᵀ)`, symmetric in sum with its counterpart.
-fn steiner(m: f64, a: [f64; 3], b: [f64; 3]) -> Mat3 {
-    [0, 1, 2].map(|i| [0, 1, 2].map(|j| m * (if i == j { dot(a, b) } else { 0.0 } - b[i] * a[j])))
-}
-
-fn unit(v: [f64; 3]) -> [f64; 3] {
-    let n = norm(v);
-    v.map(|x| x / n)
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(super) fn apply(m: &Mat3, v: [f64; 3]) -> [f64; 3] {
-    m.map(|row| dot(row, v))
-}
-
-fn transpose(m: &Mat3) -> Mat3 {
-    [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[j][i]))
-}
-
-fn multiply(a: &Mat3, b: &Mat3) -> Mat3 {
-    let t = transpose(b);
-    a.map(|row| t.map(|column| dot(row, column)))
-}
-
-fn add(a: Mat3, b: Mat3) -> Mat3 {
-    [0, 1, 2].map(|i| [0, 1, 2].map(|j| a[i][j] + b[i][j]))
-}
-
-fn trace(m: &Mat3) -> f64 {
-    m[0][0] + m[1][1] + m[2][2]
 }

@@ -7,6 +7,7 @@ mod elementary;
 mod joints;
 mod loops;
 mod massless;
+mod merged;
 mod names;
 mod numbers;
 mod shapes;
@@ -47,14 +48,14 @@ pub fn check(raw: &RawModel, findings: &mut Findings) -> Option<Model> {
     let starts = starts::starts(raw, &mut numbers);
     let links = tree::links(raw, &names, numbers.findings);
     let order = tree::order(raw, &names, &links, numbers.findings);
-    bodies::inertias(raw, &bodies, &mut numbers);
     bodies::sizes(raw, &bodies, &joints, &mut numbers);
     let params: Vec<Param> = numbers.params();
     numbers.report_unused();
+    let joints = order.as_ref().map(|order| assemble(joints, &links, &leaders, order, &inverse(order)));
+    bodies::inertias(raw, &bodies, joints.as_deref().unwrap_or(&[]), &params, findings);
     // With a broken tree there is no model to go on with.
-    let order = order?;
+    let (order, joints) = order.zip(joints)?;
     let place = inverse(&order);
-    let joints = assemble(joints, &links, &leaders, &order, &place);
     loops::rigid(raw, &constraints, &joints, &bodies, findings);
     let constraints = constraints.into_iter().flatten().map(|c| placed(c, &place)).collect();
     let starts = starts::placed(starts, &place);

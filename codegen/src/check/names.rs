@@ -20,7 +20,7 @@ pub(super) fn model_name(raw: &RawModel, findings: &mut Findings) -> String {
     };
     let fixed = if usable(&name.value) { rust_name(&name.value) } else { "model".into() };
     if fixed != name.value {
-        if raw.lenient {
+        if raw.lenient || usable(&name.value) && !name.value.is_ascii() {
             findings.notice(
                 name.span,
                 format!("model {} is called {} in generated code", quote(&name.value), quote(&fixed)),
@@ -38,7 +38,7 @@ pub(super) fn model_name(raw: &RawModel, findings: &mut Findings) -> String {
 fn usable(name: &str) -> bool {
     let hidden =
         |c: char| c.is_control() || ('\u{2028}'..='\u{202e}').contains(&c) || ('\u{2066}'..='\u{2069}').contains(&c);
-    name.chars().any(|c| c.is_ascii_alphanumeric()) && !name.contains(hidden)
+    name.chars().any(char::is_alphanumeric) && !name.contains(hidden)
 }
 
 /// What the end of a loop is named after.
@@ -178,7 +178,7 @@ fn unique<'r>(names: impl Iterator<Item = (&'r str, &'r Spanned<String>)>, findi
             findings.error(
                 name.span,
                 message,
-                "give it a name with at least one ASCII letter or digit, and no control characters",
+                "give it a name with at least one letter or digit, and no control characters",
             );
             continue;
         }
@@ -199,7 +199,7 @@ fn unique<'r>(names: impl Iterator<Item = (&'r str, &'r Spanned<String>)>, findi
             findings.error(
                 name.span,
                 message,
-                "rename one of them: only ASCII letters and digits tell names apart, and case does not",
+                "rename one of them: only letters and digits tell names apart, and case does not",
             );
         }
     }

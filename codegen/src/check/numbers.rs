@@ -7,6 +7,9 @@ use crate::model::{Param, Placement, Rotation, Unit, Value};
 use crate::rounded_once::norm;
 use std::collections::HashMap;
 
+/// Beyond this, products of a few numbers leave the range of a double, or the number itself that of an `f32`.
+const LARGEST: f64 = 1e30;
+
 /// What a number measures, for suspicions about its unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Quantity {
@@ -33,6 +36,18 @@ impl From<Unit> for Quantity {
 }
 
 impl Quantity {
+    /// Why nothing can be computed with the constant `x`.
+    fn is_beyond(self, x: f64) -> Option<String> {
+        let x = x.abs();
+        if x > LARGEST {
+            Some(format!("{x:e} is beyond what can be computed with"))
+        } else if self == Quantity::Mass && x > 0.0 && x < 1.0 / LARGEST {
+            Some(format!("{x:e} kg is beyond what can be computed with"))
+        } else {
+            None
+        }
+    }
+
     /// Why the constant `x` looks like one in another unit, and what to write.
     fn suspicion(self, x: f64) -> Option<(String, String)> {
         let x = x.abs();
@@ -75,6 +90,11 @@ impl<'r, 'f, 't> Numbers<'r, 'f, 't> {
         match &number.value {
             RawValue::Invalid => Value::Const(f64::NAN),
             RawValue::Const(x) => {
+                if let Some(message) = quantity.is_beyond(*x) {
+                    let help = format!("write a number in SI units of at most {LARGEST:e}; a mass may also be 0");
+                    self.findings.error(number.span, format!("{what}: {message}"), help);
+                    return Value::Const(f64::NAN);
+                }
                 if let Some((message, help)) = quantity.suspicion(*x) {
                     self.findings.warning(number.span, format!("{what}: {message}"), help);
                 }

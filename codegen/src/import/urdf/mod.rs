@@ -22,7 +22,7 @@ use crate::model::{FIXED, FLOATING, PLANAR, SHAPES};
 use roxmltree::{Document, Node};
 use std::collections::HashSet;
 use unused::Tally;
-use xml::{place, shown, syntax_error, Reader};
+use xml::{place, shown, syntax_error, without_late_declaration, Reader};
 
 /// Elements of a `robot` that have no effect on its motion.
 const IGNORED: [(&str, &str); 6] = [
@@ -40,6 +40,7 @@ const IGNORED: [(&str, &str); 6] = [
 /// fixed joints stay joints. A link called `ground`, a name this project keeps for the fixed world, becomes
 /// `ground_link`.
 pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings) -> Option<RawModel> {
+    let text = &*without_late_declaration(text, findings);
     let document = match Document::parse(text) {
         Ok(document) => document,
         Err(error) => {

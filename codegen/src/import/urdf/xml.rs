@@ -6,6 +6,7 @@ use crate::import::raw::{RawNumber, RawValue, RawVec3};
 use crate::import::source::{Findings, Span, Spanned};
 use crate::import::words::{did_you_mean, quote};
 use roxmltree::{Error, Node};
+use std::borrow::Cow;
 
 /// Findings that are collected while reading.
 pub(super) struct Reader<'f, 'a> {
@@ -13,6 +14,23 @@ pub(super) struct Reader<'f, 'a> {
     pub findings: &'f mut Findings<'a>,
     /// Findings that are counted by kind.
     pub tally: Tally,
+}
+
+/// A text whose declaration does not stand first, as it has to: with blanks in its place, so that all places stay.
+pub(super) fn without_late_declaration<'t>(text: &'t str, findings: &mut Findings) -> Cow<'t, str> {
+    let start = text.len() - text.trim_start().len();
+    let (true, Some(length)) = (start > 0 && text[start..].starts_with("<?xml "), text[start..].find("?>")) else {
+        return Cow::Borrowed(text);
+    };
+    let end = start + length + 2;
+    let message = "the XML declaration does not stand at the start of the file";
+    findings.warning(
+        Span::new(start, end),
+        message,
+        "remove the blank lines before it: other programs refuse the file",
+    );
+    let blanks: String = text[start..end].bytes().map(|b| if b == b'\n' { '\n' } else { ' ' }).collect();
+    Cow::Owned(format!("{}{blanks}{}", &text[..start], &text[end..]))
 }
 
 /// Place of the opening `<name` of an element.
