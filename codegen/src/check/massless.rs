@@ -29,7 +29,8 @@ pub(super) fn leaves(raw: &RawModel, order: &[usize], model: &Model, findings: &
     let mut heavy: Vec<bool> = model.joints.iter().map(|j| is_heavy(&model.bodies[j.child])).collect();
     let mut moving = vec![false; n];
     let mut reported = vec![false; n];
-    let mut inertia: Vec<Option<Inertia>> = model.joints.iter().map(|j| constant(&model.bodies[j.child])).collect();
+    let mut inertia: Vec<Option<Inertia>> =
+        model.joints.iter().map(|j| constant(&model.bodies[j.child], &model.params)).collect();
     for k in (0..n).rev() {
         let joint = &model.joints[k];
         let nv = joint.kind.nv();
@@ -86,10 +87,10 @@ fn is_heavy(body: &Body) -> bool {
     body.mass != Value::ZERO || body.inertia.iter().any(|x| *x != Value::ZERO)
 }
 
-/// Inertia of a body in its own frame; `None` if a parameter has a say in it.
-fn constant(body: &Body) -> Option<Inertia> {
-    let numbers = body.com.iter().chain(&body.inertia).chain([&body.mass]);
-    numbers.fold(true, |all, x| all && x.constant().is_some()).then(|| own(body, &[]))
+/// Inertia of a body in its own frame; `None` if a parameter other than one of its axes has a say in it.
+fn constant(body: &Body, params: &[Param]) -> Option<Inertia> {
+    let mut numbers = body.com.iter().chain(&body.inertia).chain([&body.mass]);
+    numbers.all(|x| x.constant().is_some()).then(|| own(body, params))
 }
 
 /// Velocity and angular velocity of the child frame per unit of each freedom, at zero coordinates. Of the directions
