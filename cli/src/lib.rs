@@ -8,6 +8,7 @@ mod certify;
 mod check;
 mod condition;
 mod contacts;
+mod convert;
 mod count;
 mod displacement;
 mod energy;
@@ -101,6 +102,7 @@ fn run(command: Option<Command>, out: &mut dyn Write) -> Outcome {
     match command {
         None => tour::run(out),
         Some(Command::Check(a)) => check::run(&a, out),
+        Some(Command::Convert(a)) => convert::run(&a, out),
         Some(Command::Count(a)) => count::run(&a, out),
         Some(Command::Generate(a)) => generate::run(&a, out),
         Some(Command::Eval(a)) => eval::run(&a, out),

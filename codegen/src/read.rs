@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::check::{changed, check};
 use crate::diag::Diagnostics;
+use crate::import::raw::RawModel;
 use crate::import::source::{Findings, Span};
 use crate::import::words::{did_you_mean, list, quote};
 use crate::import::{toml, urdf};
@@ -144,21 +145,7 @@ pub fn load_variant(
 /// [`load`], with all variants.
 pub fn load_all(file: &str, text: &str, options: &ImportOptions) -> (Option<(Model, Vec<Variant>)>, Diagnostics) {
     let mut findings = Findings::new(file, text);
-    let extension = Path::new(file).extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-    let mut refuse = |message: &str, help: &str| {
-        findings.error(Span::FILE, message, help);
-        None
-    };
-    const KNOWN: &str = "models are read from `.toml` and `.urdf` files";
-    let raw = match extension.as_deref() {
-        Some("toml") => toml::read(text, options, &mut findings),
-        Some("urdf") => urdf::read(text, options, &mut findings),
-        Some("xml") if text.contains("<robot") => urdf::read(text, options, &mut findings),
-        Some("xml") => refuse("no `<robot>` in this file", "of XML formats only URDF can be read"),
-        Some("xacro") => refuse("xacro files have to be expanded first", "run `xacro model.xacro > model.urdf`"),
-        Some(other) => refuse(&format!("cannot read files that end in {}", quote(other)), KNOWN),
-        None => refuse("the file name does not tell the format", KNOWN),
-    };
+    let raw = raw_model(file, text, options, &mut findings);
     let mut variants = Vec::new();
     let model = raw.and_then(|raw| {
         let model = check(&raw, &mut findings);
@@ -176,6 +163,57 @@ pub fn load_all(file: &str, text: &str, options: &ImportOptions) -> (Option<(Mod
         model
     });
     (model.filter(|_| !findings.has_errors()).map(|model| (model, variants)), findings.finish())
+}
+
+/// The model of a text before the checks, by the format that the file name ends in.
+fn raw_model(file: &str, text: &str, options: &ImportOptions, findings: &mut Findings) -> Option<RawModel> {
+    let extension = Path::new(file).extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let mut refuse = |message: &str, help: &str| {
+        findings.error(Span::FILE, message, help);
+        None
+    };
+    const KNOWN: &str = "models are read from `.toml` and `.urdf` files";
+    match extension.as_deref() {
+        Some("toml") => toml::read(text, options, findings),
+        Some("urdf") => urdf::read(text, options, findings),
+        Some("xml") if text.contains("<robot") => urdf::read(text, options, findings),
+        Some("xml") => refuse("no `<robot>` in this file", "of XML formats only URDF can be read"),
+        Some("xacro") => refuse("xacro files have to be expanded first", "run `xacro model.xacro > model.urdf`"),
+        Some(other) => refuse(&format!("cannot read files that end in {}", quote(other)), KNOWN),
+        None => refuse("the file name does not tell the format", KNOWN),
+    }
+}
+
+/// A description of any format as one of the TOML format, which parameters, loops, frames and the rest can be added to.
+/// The text is read back and compared: it describes an equal model, with equal variants. Comments are lost. With the text
+/// come the warnings and notices about the source.
+///
+/// # Errors
+/// All findings where one of them is an error, and a floor in the options, which the TOML format describes by a shape.
+pub fn to_toml(file: &str, text: &str, options: &ImportOptions) -> Result<(String, Diagnostics), Diagnostics> {
+    let (read, findings) = load_all(file, text, options);
+    let Some(read) = read else { return Err(findings) };
+    let refused = |message: &str, help: &str| {
+        let mut findings = Findings::new(file, text);
+        findings.error(Span::FILE, message, help);
+        Err(findings.finish())
+    };
+    if options.floor.is_some() {
+        return refused(
+            "a floor of the options is not converted",
+            "convert without it, and add a `plane` and contacts",
+        );
+    }
+    let Some(mut raw) = raw_model(file, text, options, &mut Findings::new(file, text)) else { return Err(findings) };
+    // Files of this project are judged strictly wherever they pass.
+    for lenient in [false, raw.lenient] {
+        raw.lenient = lenient;
+        let converted = toml::write(&raw, &read.0.name);
+        if load_all("converted.toml", &converted, &ImportOptions::default()).0.as_ref() == Some(&read) {
+            return Ok((converted, findings));
+        }
+    }
+    refused("the TOML format cannot express this model", "report this file: it shows a defect of the converter")
 }
 
 #[cfg(test)]

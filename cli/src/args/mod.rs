@@ -25,6 +25,7 @@ Without a command, mbd shows a tour with a real robot, which takes a few seconds
 const EXAMPLES: &str = "Examples:
   mbd                                                 the tour
   mbd check robot.urdf                                is the file sound, and what is in it?
+  mbd convert robot.urdf -o robot.toml                the robot in a format that can be added to
   mbd count robot.urdf --base floating                what does each sweep cost?
   mbd generate robot.urdf --outputs rates -o robot.rs straight-line Rust
   mbd generate robot.urdf --lang c -o robot.c         the same in C99, with robot.h
@@ -49,6 +50,8 @@ pub struct Arguments {
 pub enum Command {
     /// Read models, and report what is wrong with them or what they contain
     Check(CheckArgs),
+    /// Convert a description, such as a URDF robot, to the TOML format, where it can be changed and added to
+    Convert(ConvertArgs),
     /// Count the operations of every output, sweep by sweep
     Count(CountArgs),
     /// Generate Rust, C or WebAssembly
@@ -144,6 +147,25 @@ pub struct CheckArgs {
     /// Write the files that --generated finds missing or different
     #[arg(long, requires = "generated")]
     pub update: bool,
+}
+
+/// `mbd convert`.
+#[derive(Args)]
+#[command(
+    after_help = "The text is read back before it is written, and describes exactly the same mechanism: every number has as many
+digits as give it back. What the readers do not use (meshes, colours, comments) is not converted."
+)]
+pub struct ConvertArgs {
+    /// Description of the mechanism, `.toml` or `.urdf`
+    pub model: PathBuf,
+    #[command(flatten)]
+    pub import: ImportArgs,
+    /// Make stops of the joint limits of a URDF
+    #[arg(long)]
+    pub limits: bool,
+    /// File to write in place of standard output
+    #[arg(short, long)]
+    pub output: Option<PathBuf>,
 }
 
 /// `mbd count`.

@@ -12,7 +12,7 @@ fn help_teaches() {
     for word in ["tour", "check", "count", "generate", "eval", "certify", "simulate", "explain", "Exit status"] {
         assert!(out(&output).contains(word), "{word}");
     }
-    for command in ["check", "count", "generate", "eval", "certify", "simulate", "explain"] {
+    for command in ["check", "convert", "count", "generate", "eval", "certify", "simulate", "explain"] {
         let output = good(run(&[command, "--help"]));
         assert!(out(&output).contains("--gravity"), "{command}");
     }
@@ -468,4 +468,29 @@ fn robots_of_others_are_judged_by_what_moves() {
     assert!(out(&code).contains("pub struct U8fdeU6746"), "{}", out(&code));
     write(&folder, "moving.urdf", &with_antenna("continuous"));
     bad(run_in(&folder, &["check", "moving.urdf"]), &["error: inertia of `antenna` has a negative moment\n"]);
+}
+
+#[test]
+fn robots_are_converted() {
+    let folder = folder("convert");
+    let robot = format!("{ROOT}/models/solo12.urdf");
+    good(run_in(&folder, &["convert", &robot, "--base", "floating", "-o", "solo12.toml"]));
+    let sound = |arguments: &[&str]| {
+        let output = good(run_in(&folder, arguments));
+        out(&output).split_once(": ").expect("a summary").1.to_string()
+    };
+    assert_eq!(sound(&["check", "solo12.toml"]), sound(&["check", &robot, "--base", "floating"]));
+    let code = |model: &str, base: &[&str]| {
+        let all = [&["generate", model, "--outputs", "rates"], base].concat();
+        // The header names the source.
+        let output = good(run_in(&folder, &all));
+        out(&output).lines().filter(|line| !line.contains("solo12.")).map(String::from).collect::<Vec<_>>()
+    };
+    assert_eq!(code("solo12.toml", &[]), code(&robot, &["--base", "floating"]));
+    // A converted robot can be added to.
+    let mut text = read(&folder, "solo12.toml");
+    text += "\n[[frame]]\nname = \"camera\"\nbody = \"base_link\"\nxyz = [0.2, 0, 0]\n";
+    write(&folder, "seeing.toml", &text);
+    good(run_in(&folder, &["check", "seeing.toml"]));
+    bad(run_in(&folder, &["convert", "solo12.toml", "-o", "solo12.toml"]), &["it is the input of this command"]);
 }

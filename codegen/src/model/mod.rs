@@ -14,7 +14,7 @@ pub use constraint::{
 };
 pub use contact::{Contact, Shape, ShapeKind, ShapeSpec, SHAPES};
 pub use joint::{Coordinate, Freedom, Joint, JointKind, JointMotion, JointSpec, JOINTS};
-pub(crate) use joint::{FIXED, FLOATING, PLANAR};
+pub(crate) use joint::{FIXED, FLOATING, PLANAR, REVOLUTE};
 
 /// Place of a part of the description in its file. It is ignored in comparisons: two models are equal if they describe
 /// the same mechanism.

@@ -1,6 +1,7 @@
 //! The readers of TOML and URDF: the models of valid files, and the findings about others.
 
 mod broken;
+mod convert;
 mod large;
 mod mutate;
 mod mutation;

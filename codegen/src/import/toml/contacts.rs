@@ -17,7 +17,7 @@ const CONTACT: &[&str] = &["name", "between", "friction", "restitution", "law"];
 const CONTACTS: &[&str] = &["pairs", "friction", "restitution", "law"];
 
 /// The laws of restitution by their words.
-const LAWS: [(&str, RestitutionLaw); 3] =
+pub(super) const LAWS: [(&str, RestitutionLaw); 3] =
     [("poisson", RestitutionLaw::Poisson), ("stronge", RestitutionLaw::Stronge), ("newton", RestitutionLaw::Newton)];
 
 /// Shapes and contacts.

@@ -8,7 +8,7 @@ use super::super::source::{Findings, Span, Spanned};
 use super::kinds::kind;
 use super::numbers::{self, Unit};
 use super::table::Table;
-use crate::model::{JointSpec, WrenchAxes, JOINTS};
+use crate::model::{JointSpec, WrenchAxes, JOINTS, REVOLUTE};
 use ::toml::de::DeValue;
 
 const BODY: &[&str] = &["name", "mass", "com", "inertia", "inertia_rpy"];
@@ -27,6 +27,7 @@ const JOINT: &[&str] = &[
     "stiffness",
     "rest",
     "armature",
+    "unbounded",
     "motion",
     "mimic",
     "start",
@@ -37,7 +38,7 @@ const JOINT: &[&str] = &[
 ];
 const FRAME: &[&str] = &["name", "body", "xyz", "rpy", "rotate"];
 const WRENCH: &[&str] = &["name", "body", "frame"];
-const INERTIA: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
+pub(super) const INERTIA: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
 
 pub(super) fn body(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     let all_known = table.reject_unknown(BODY, "a body", findings);
@@ -163,6 +164,7 @@ pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
         stiffness,
         rest,
         armature,
+        unbounded: unbounded(&table, kind.as_ref().map(|k| k.value), findings),
         motion,
         mimic: mimic(&table, units, findings),
         start,
@@ -175,6 +177,16 @@ pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     if name.is_some() {
         raw.joints.push(joint);
     }
+}
+
+/// Whether other programs may store the angle as cosine and sine.
+fn unbounded(table: &Table, kind: Option<&JointSpec>, findings: &mut Findings) -> bool {
+    let Some(flag) = table.flag("unbounded", findings).filter(|flag| flag.value) else { return false };
+    if kind.is_some_and(|kind| *kind != REVOLUTE) {
+        let help = "remove it: only a revolute joint turns without end in other programs";
+        findings.error(flag.span, format!("{}`unbounded` is for revolute joints", table.prefix()), help);
+    }
+    true
 }
 
 /// `[lower, upper]`, or a table of one or both.

@@ -7,17 +7,19 @@ mod kinds;
 mod numbers;
 mod table;
 mod variants;
+mod write;
 
 use ::toml::de::{DeTable, DeValue, Error};
 
 use self::table::Table;
+pub use self::write::write;
 use super::raw::{RawGravity, RawJoint, RawModel, RawParam, RawValue};
 use super::source::{Findings, Span, Spanned};
 use super::words::quote;
 use super::{Base, ImportOptions};
 
 const KEYS: &[&str] = &[
-    "name", "gravity", "params", "body", "joint", "frame", "wrench", "loop", "coupling", "shape", "contact",
+    "name", "checks", "gravity", "params", "body", "joint", "frame", "wrench", "loop", "coupling", "shape", "contact",
     "contacts", "variant",
 ];
 
@@ -58,6 +60,7 @@ fn document(text: &str, findings: &mut Findings) -> Option<RawModel> {
     let mut raw = RawModel::empty();
     top.reject_unknown(KEYS, "a model", findings);
     raw.name = top.text("name", findings);
+    raw.lenient = top.choice("checks", &["strict", "lenient"], findings).is_some_and(|choice| choice.value == 1);
     raw.gravity = top.get("gravity").and_then(|(span, value)| gravity(&top, span, value, findings));
     if let Some(table) = top.table("params", findings) {
         params(&table, &mut raw, findings);
