@@ -13,13 +13,14 @@ pub fn run(args: &ConvertArgs, out: &mut dyn Write) -> Outcome {
     let text = source::read(&args.model)?;
     let options = ImportOptions { limits: args.limits, ..args.import.import() };
     let file = args.model.to_string_lossy();
-    let (toml, findings) = match mentioned(format!("converting {file}"), || to_toml(&file, &text, &options)) {
-        Ok(converted) => converted,
-        Err(findings) => {
-            note(format_args!("{findings}"));
-            return Err(Failure::Shown);
-        }
-    };
+    let (toml, findings) =
+        match mentioned(format!("converting {file}"), || to_toml(&file, &text, &options, &source::base)) {
+            Ok(converted) => converted,
+            Err(findings) => {
+                note(format_args!("{findings}"));
+                return Err(Failure::Shown);
+            }
+        };
     if !findings.0.is_empty() {
         note(format_args!("{findings}"));
     }

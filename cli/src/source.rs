@@ -7,7 +7,7 @@ use multibody::codegen::diag::Diagnostics;
 use multibody::codegen::model::{Model, Wrench, WrenchAxes};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
-use multibody::codegen::read::{load_all, load_variant, ImportOptions, Variant};
+use multibody::codegen::read::{load_variant, load_with, ImportOptions, Variant};
 use multibody::codegen::search::{self, Chosen};
 use multibody::codegen::words;
 use multibody::runtime::interp::MassMatrixError;
@@ -56,12 +56,18 @@ fn similar(path: &Path) -> String {
 
 /// Reads and checks a model. All findings go to standard error.
 pub fn model(path: &Path, options: &ImportOptions, variant: Option<&str>) -> Outcome<Model> {
-    told(path, |file, text| load_variant(file, text, options, variant))
+    told(path, |file, text| load_variant(file, text, options, &base, variant))
 }
 
 /// Reads and checks a model and its variants. All findings go to standard error.
 pub fn models(path: &Path, options: &ImportOptions) -> Outcome<(Model, Vec<Variant>)> {
-    told(path, |file, text| load_all(file, text, options))
+    told(path, |file, text| load_with(file, text, options, &base))
+}
+
+/// The text of the base that a description names.
+pub fn base(path: &Path) -> std::io::Result<String> {
+    is_input(path);
+    std::fs::read_to_string(path)
 }
 
 /// What is read from a file, with the findings told.

@@ -11,7 +11,7 @@ use crate::import::{toml, urdf};
 use crate::model::Model;
 use crate::names::rust_name;
 
-pub use crate::import::{Base, Floor, ImportOptions};
+pub use crate::import::{Base, Floor, ImportOptions, ReadFile};
 
 /// A model that was read.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,7 +39,8 @@ pub struct Variant {
 /// it.
 ///
 /// `file` names the source in the findings and in the origins of the model, and gives the model its name if the text
-/// does not; nothing is read from disk.
+/// does not. Of other files, only the `[base]` that a TOML text names is read, from its path relative to the folder of
+/// `file`.
 ///
 /// # Errors
 /// All findings at once, in the order of the text, where one of them is an error.
@@ -122,14 +123,15 @@ pub fn load(file: &str, text: &str, options: &ImportOptions) -> (Option<Model>, 
     (model.map(|(model, _)| model), findings)
 }
 
-/// [`load`], of the variant of that name if there is one; that there is no such variant is an error.
+/// [`load_with`], of the variant of that name if there is one; that there is no such variant is an error.
 pub fn load_variant(
     file: &str,
     text: &str,
     options: &ImportOptions,
+    files: ReadFile,
     variant: Option<&str>,
 ) -> (Option<Model>, Diagnostics) {
-    let (read, mut findings) = load_all(file, text, options);
+    let (read, mut findings) = load_with(file, text, options, files);
     let Some((model, variants)) = read else { return (None, findings) };
     match chosen(model, variants, variant) {
         Ok(model) => (Some(model), findings),
@@ -144,8 +146,19 @@ pub fn load_variant(
 
 /// [`load`], with all variants.
 pub fn load_all(file: &str, text: &str, options: &ImportOptions) -> (Option<(Model, Vec<Variant>)>, Diagnostics) {
+    load_with(file, text, options, &|path| std::fs::read_to_string(path))
+}
+
+/// [`load_all`], with the `[base]` of a TOML text read by `files`, to which its path is given as it is relative to
+/// `file`.
+pub fn load_with(
+    file: &str,
+    text: &str,
+    options: &ImportOptions,
+    files: ReadFile,
+) -> (Option<(Model, Vec<Variant>)>, Diagnostics) {
     let mut findings = Findings::new(file, text);
-    let raw = raw_model(file, text, options, &mut findings);
+    let raw = raw_model(file, text, options, &mut findings, files);
     let mut variants = Vec::new();
     let model = raw.and_then(|raw| {
         let model = check(&raw, &mut findings);
@@ -166,7 +179,13 @@ pub fn load_all(file: &str, text: &str, options: &ImportOptions) -> (Option<(Mod
 }
 
 /// The model of a text before the checks, by the format that the file name ends in.
-fn raw_model(file: &str, text: &str, options: &ImportOptions, findings: &mut Findings) -> Option<RawModel> {
+fn raw_model(
+    file: &str,
+    text: &str,
+    options: &ImportOptions,
+    findings: &mut Findings,
+    files: ReadFile,
+) -> Option<RawModel> {
     let extension = Path::new(file).extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let mut refuse = |message: &str, help: &str| {
         findings.error(Span::FILE, message, help);
@@ -174,7 +193,7 @@ fn raw_model(file: &str, text: &str, options: &ImportOptions, findings: &mut Fin
     };
     const KNOWN: &str = "models are read from `.toml` and `.urdf` files";
     match extension.as_deref() {
-        Some("toml") => toml::read(text, options, findings),
+        Some("toml") => toml::read(text, options, findings, files),
         Some("urdf") => urdf::read(text, options, findings),
         Some("xml") if text.contains("<robot") => urdf::read(text, options, findings),
         Some("xml") => refuse("no `<robot>` in this file", "of XML formats only URDF can be read"),
@@ -186,12 +205,17 @@ fn raw_model(file: &str, text: &str, options: &ImportOptions, findings: &mut Fin
 
 /// A description of any format as one of the TOML format, which parameters, loops, frames and the rest can be added to.
 /// The text is read back and compared: it describes an equal model, with equal variants. Comments are lost. With the text
-/// come the warnings and notices about the source.
+/// come the warnings and notices about the source. A `[base]` is read by `files` and becomes part of the text.
 ///
 /// # Errors
 /// All findings where one of them is an error, and a floor in the options, which the TOML format describes by a shape.
-pub fn to_toml(file: &str, text: &str, options: &ImportOptions) -> Result<(String, Diagnostics), Diagnostics> {
-    let (read, findings) = load_all(file, text, options);
+pub fn to_toml(
+    file: &str,
+    text: &str,
+    options: &ImportOptions,
+    files: ReadFile,
+) -> Result<(String, Diagnostics), Diagnostics> {
+    let (read, findings) = load_with(file, text, options, files);
     let Some(read) = read else { return Err(findings) };
     let refused = |message: &str, help: &str| {
         let mut findings = Findings::new(file, text);
@@ -204,7 +228,9 @@ pub fn to_toml(file: &str, text: &str, options: &ImportOptions) -> Result<(Strin
             "convert without it, and add a `plane` and contacts",
         );
     }
-    let Some(mut raw) = raw_model(file, text, options, &mut Findings::new(file, text)) else { return Err(findings) };
+    let Some(mut raw) = raw_model(file, text, options, &mut Findings::new(file, text), files) else {
+        return Err(findings);
+    };
     // Files of this project are judged strictly wherever they pass.
     for lenient in [false, raw.lenient] {
         raw.lenient = lenient;

@@ -1,11 +1,12 @@
 //! Expansion of the macro.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use mbd_codegen::diag::{Diagnostic, Severity};
 use mbd_codegen::model::Model;
 use mbd_codegen::modes::{parse, ModeChoice};
-use mbd_codegen::read::{chosen, load_all, Base, ImportOptions, Variant};
+use mbd_codegen::read::{chosen, load_with, Base, ImportOptions, Variant};
 use mbd_codegen::words::{closest, did_you_mean, list, quote};
 use mbd_codegen::{generate, transfer_code, Output};
 use proc_macro2::{Group as Tokens, Ident, Literal, Span, TokenStream, TokenTree};
@@ -26,7 +27,8 @@ pub fn expand(input: TokenStream) -> TokenStream {
     let mut watched = TokenStream::new();
     let (mut model, mut all) = (None, None);
     if let Some(text) = &text {
-        let (read, findings) = text.load(&args);
+        let (read, findings, base) = text.load(&args);
+        watched.extend(base.as_deref().map(tracked));
         all = read.clone();
         model = read.and_then(|(model, variants)| {
             let (name, place) = args.variant.as_ref().map_or((None, text.place), |(name, place)| (Some(name), *place));
@@ -157,16 +159,22 @@ impl Text {
         (format!("{at}{}", d.message), d.help.clone())
     }
 
-    fn load(&self, args: &Args) -> (Option<(Model, Vec<Variant>)>, Vec<Diagnostic>) {
+    /// The model and its variants, the findings, and the file that the description names as its base.
+    fn load(&self, args: &Args) -> (Option<(Model, Vec<Variant>)>, Vec<Diagnostic>, Option<PathBuf>) {
+        let read_base = RefCell::new(None);
+        let files = |path: &Path| {
+            let root = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from).unwrap_or_default();
+            let file = root.join(path);
+            let text = std::fs::read_to_string(&file)?;
+            *read_base.borrow_mut() = Some(file);
+            Ok(text)
+        };
         let base = args.base.map_or(Base::default(), |(base, _)| base);
         // This is reported at the argument itself.
         let base = if self.is_toml() { Base::default() } else { base };
-        let (model, findings) = load_all(
-            &self.label,
-            &self.text,
-            &ImportOptions { base, gravity: args.gravity, ..ImportOptions::default() },
-        );
-        (model, findings.0)
+        let options = ImportOptions { base, gravity: args.gravity, ..ImportOptions::default() };
+        let (model, findings) = load_with(&self.label, &self.text, &options, &files);
+        (model, findings.0, read_base.take())
     }
 
     /// Makes the compiler read the file again when it changes.

@@ -1,5 +1,6 @@
 //! Tests of the library as users see it: generated types, committed code, shipped models, reference data.
 
+mod base;
 mod batch;
 mod committed;
 mod contacts;

@@ -494,3 +494,19 @@ fn robots_are_converted() {
     good(run_in(&folder, &["check", "seeing.toml"]));
     bad(run_in(&folder, &["convert", "solo12.toml", "-o", "solo12.toml"]), &["it is the input of this command"]);
 }
+
+#[test]
+fn robots_are_added_to() {
+    let folder = folder("base");
+    std::fs::copy(format!("{ROOT}/models/ur5.urdf"), folder.join("ur5.urdf")).expect("a copy");
+    std::fs::copy(format!("{ROOT}/models/ur5_tool.toml"), folder.join("tool.toml")).expect("a copy");
+    let output = good(run_in(&folder, &["check", "tool.toml"]));
+    assert!(out(&output).contains("12 bodies") && out(&output).contains("external wrenches: 1"), "{}", out(&output));
+    good(run_in(&folder, &["convert", "tool.toml", "-o", "whole.toml"]));
+    let whole = good(run_in(&folder, &["check", "whole.toml"]));
+    assert_eq!(out(&whole).replace("whole.toml", "tool.toml"), out(&output));
+    // The base is input, too.
+    bad(run_in(&folder, &["generate", "tool.toml", "-o", "ur5.urdf"]), &["it is the input of this command"]);
+    std::fs::remove_file(folder.join("ur5.urdf")).expect("the copy");
+    bad(run_in(&folder, &["check", "tool.toml"]), &["tool.toml:7:8: error: cannot read the base `ur5.urdf`"]);
+}

@@ -33,6 +33,9 @@ pub struct ImportOptions {
     pub floor: Option<Floor>,
 }
 
+/// How the file that a description names as its base is read.
+pub type ReadFile<'f> = &'f dyn Fn(&std::path::Path) -> std::io::Result<String>;
+
 /// A floor across z of the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Floor {

@@ -1,5 +1,6 @@
 //! Places in a source text and the collector of findings that every reader and the checks write to.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use crate::diag::{Diagnostic, Diagnostics, Severity};
@@ -49,14 +50,15 @@ impl<T> Spanned<T> {
 /// Turns byte offsets into lines and columns.
 #[derive(Clone, Debug)]
 pub struct SourceMap<'a> {
-    text: &'a str,
+    text: Cow<'a, str>,
     /// Byte offset of the first byte of each line.
     lines: Vec<usize>,
 }
 
 impl<'a> SourceMap<'a> {
     /// Finds the starts of the lines of `text`.
-    pub fn new(text: &'a str) -> Self {
+    pub fn new(text: impl Into<Cow<'a, str>>) -> Self {
+        let text = text.into();
         let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(k, _)| k + 1)).collect();
         SourceMap { text, lines }
     }
@@ -87,12 +89,29 @@ pub struct Findings<'a> {
     list: Vec<Diagnostic>,
     /// Warnings about what nothing uses, unless a variant does.
     unused: Vec<Diagnostic>,
+    /// The file that this one changes, if it does.
+    base: Option<Arc<BaseSource>>,
+}
+
+/// A second source, whose places begin where those of the first end.
+#[derive(Debug)]
+struct BaseSource {
+    file: Arc<str>,
+    start: usize,
+    map: SourceMap<'static>,
 }
 
 impl<'a> Findings<'a> {
     /// A collector without findings; `file` is the name that the caller gave.
     pub fn new(file: &str, text: &'a str) -> Self {
-        Findings { file: file.into(), map: SourceMap::new(text), list: Vec::new(), unused: Vec::new() }
+        Findings { file: file.into(), map: SourceMap::new(text), list: Vec::new(), unused: Vec::new(), base: None }
+    }
+
+    /// Adds the file that this one changes: its places are those of `text` from the offset that is returned.
+    pub fn add_base(&mut self, file: &str, text: String) -> usize {
+        let start = self.map.text.len() + 1;
+        self.base = Some(Arc::new(BaseSource { file: file.into(), start, map: SourceMap::new(text) }));
+        start
     }
 
     /// A collector without findings about the same file.
@@ -152,6 +171,10 @@ impl<'a> Findings<'a> {
 
     /// Place of the start of a span.
     pub fn origin(&self, span: Span) -> Origin {
+        if let Some(base) = self.base.as_ref().filter(|base| span.start >= base.start) {
+            let (line, column) = base.map.position(span.start - base.start);
+            return Origin { file: base.file.clone(), line, column };
+        }
         let (line, column) = if span == Span::FILE { (0, 0) } else { self.map.position(span.start) };
         Origin { file: self.file.clone(), line, column }
     }
@@ -161,10 +184,11 @@ impl<'a> Findings<'a> {
         self.list.iter().any(|d| d.severity == Severity::Error)
     }
 
-    /// All findings, in the order of the file.
+    /// All findings, in the order of the file; behind them those about the file that it changes.
     pub fn finish(mut self) -> Diagnostics {
         self.list.append(&mut self.unused);
-        self.list.sort_by_key(|d| (d.line, d.column));
+        let file = &self.file;
+        self.list.sort_by_key(|d| (*d.file != **file, d.line, d.column));
         Diagnostics(self.list)
     }
 }

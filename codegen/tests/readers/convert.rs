@@ -4,6 +4,11 @@ use std::path::{Path, PathBuf};
 
 use mbd_codegen::read::{load_all, to_toml, Base, ImportOptions};
 
+/// No file is there.
+fn none(path: &Path) -> std::io::Result<String> {
+    Err(std::io::Error::new(std::io::ErrorKind::NotFound, path.display().to_string()))
+}
+
 /// Files below a folder that end so.
 fn files(folder: &Path, all: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("a folder") {
@@ -20,11 +25,13 @@ fn files(folder: &Path, all: &mut Vec<PathBuf>) {
 fn converted(path: &Path, options: &ImportOptions) {
     let (file, text) = (path.to_string_lossy(), std::fs::read_to_string(path).expect("a model"));
     let (model, _) = load_all(&file, &text, options);
-    let (toml, _) = to_toml(&file, &text, options).unwrap_or_else(|findings| panic!("{file}: {findings}"));
+    // A base is there, and is in what was converted.
+    let (toml, _) = to_toml(&file, &text, options, &|path| std::fs::read_to_string(path))
+        .unwrap_or_else(|findings| panic!("{file}: {findings}"));
     let (again, findings) = load_all("again.toml", &toml, &ImportOptions::default());
     assert!(again.is_some() && again == model, "{file}: {findings}");
     // What was converted is converted to itself.
-    let (twice, _) = to_toml("again.toml", &toml, &ImportOptions::default()).expect("a sound model");
+    let (twice, _) = to_toml("again.toml", &toml, &ImportOptions::default(), &none).expect("a sound model");
     assert_eq!(twice, toml, "{file}");
 }
 
@@ -54,6 +61,6 @@ fn a_floor_is_not_converted() {
     let floor = Some(mbd_codegen::read::Floor { height: 0.0, friction: 0.5 });
     let text = "<robot name='r'><link name='l'/></robot>";
     let findings =
-        to_toml("r.urdf", text, &ImportOptions { floor, ..ImportOptions::default() }).expect_err("a refusal");
+        to_toml("r.urdf", text, &ImportOptions { floor, ..ImportOptions::default() }, &none).expect_err("a refusal");
     assert!(findings.to_string().contains("floor"), "{findings}");
 }

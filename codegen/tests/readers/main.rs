@@ -1,5 +1,6 @@
 //! The readers of TOML and URDF: the models of valid files, and the findings about others.
 
+mod base;
 mod broken;
 mod convert;
 mod large;

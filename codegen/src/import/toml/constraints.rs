@@ -29,7 +29,7 @@ pub(super) fn all(top: &Table, joints: &[RawJoint], raw: &mut RawModel, findings
         found.extend(coupling(&table, &lengths, findings).map(|c| (at, RawConstraint::Coupling(c))));
     }
     found.sort_by_key(|(at, _)| *at);
-    raw.constraints = found.into_iter().map(|(_, c)| c).collect();
+    raw.constraints.extend(found.into_iter().map(|(_, c)| c));
 }
 
 fn one_loop(table: &Table, findings: &mut Findings) -> Option<RawLoop> {

@@ -5,6 +5,7 @@ use super::super::raw::{
     RawRotation, RawValue, RawWrench,
 };
 use super::super::source::{Findings, Span, Spanned};
+use super::base::{self, Known};
 use super::kinds::kind;
 use super::numbers::{self, Unit};
 use super::table::Table;
@@ -40,7 +41,7 @@ const FRAME: &[&str] = &["name", "body", "xyz", "rpy", "rotate"];
 const WRENCH: &[&str] = &["name", "body", "frame"];
 pub(super) const INERTIA: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
 
-pub(super) fn body(table: Table, raw: &mut RawModel, findings: &mut Findings) {
+pub(super) fn body(table: Table, known: &mut Known, raw: &mut RawModel, findings: &mut Findings) {
     let all_known = table.reject_unknown(BODY, "a body", findings);
     let name = table.required_text("name", findings);
     // A misspelt mass is reported as misspelt, and not as missing.
@@ -49,9 +50,15 @@ pub(super) fn body(table: Table, raw: &mut RawModel, findings: &mut Findings) {
     let com = table.vec3("com", Unit::Plain, findings);
     let inertia = inertia(&table, findings);
     let inertia_axes = table.vec3("inertia_rpy", Unit::Angle, findings).map(RawRotation::Rpy);
-    match name {
-        Some(name) => raw.bodies.push(RawBody { name, mass, com, inertia, inertia_axes }),
-        None => raw.incomplete = true,
+    let Some(name) = name else {
+        raw.incomplete = true;
+        return;
+    };
+    let at = known.bodies.remove(&name.value);
+    let body = RawBody { name, mass, com, inertia, inertia_axes };
+    match at {
+        Some(at) => base::change_body(&mut raw.bodies[at], body),
+        None => raw.bodies.push(body),
     }
 }
 
@@ -132,11 +139,19 @@ fn start(table: &Table, kind: Option<&JointSpec>, units: &[Unit], findings: &mut
     numbers::freedoms(value, units, &format!("{}`start`", table.prefix()), findings)
 }
 
-pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
+pub(super) fn joint(table: Table, known: &mut Known, raw: &mut RawModel, findings: &mut Findings) {
     table.reject_unknown(JOINT, "a joint", findings);
     let name = table.required_text("name", findings);
-    let kind = kind(&table, &JOINTS, |spec| &spec.words, |_| None, findings);
-    let child = table.required_text("child", findings);
+    let at = name.as_ref().and_then(|name| known.joints.remove(&name.value));
+    let of_base = at.map(|at| &raw.joints[at]);
+    let kind = match of_base.filter(|_| !table.has("type")) {
+        Some(of_base) => of_base.kind.clone(),
+        None => kind(&table, &JOINTS, |spec| &spec.words, |_| None, findings),
+    };
+    let child = match of_base.filter(|_| !table.has("child")) {
+        Some(of_base) => of_base.child.clone(),
+        None => table.required_text("child", findings),
+    };
     // Without its joint, the body would be reported as having none.
     raw.incomplete |= child.is_none() || name.is_none();
     let units = units(kind.as_ref().map(|k| k.value));
@@ -174,8 +189,10 @@ pub(super) fn joint(table: Table, raw: &mut RawModel, findings: &mut Findings) {
         limit_restitution: table.number("limit_restitution", Unit::Plain, findings),
         ..RawJoint::new(name.clone().unwrap_or(Spanned::new(String::new(), table.span)), kind, child)
     };
-    if name.is_some() {
-        raw.joints.push(joint);
+    match at {
+        Some(at) => base::change_joint(&mut raw.joints[at], joint),
+        None if name.is_some() => raw.joints.push(joint),
+        None => {}
     }
 }
 

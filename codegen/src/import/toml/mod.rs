@@ -1,5 +1,6 @@
 //! The TOML model format (docs/model-format.md). Here: the document and its top level.
 
+mod base;
 mod constraints;
 mod contacts;
 mod entries;
@@ -11,21 +12,31 @@ mod write;
 
 use ::toml::de::{DeTable, DeValue, Error};
 
+use self::base::Known;
 use self::table::Table;
 pub use self::write::write;
 use super::raw::{RawGravity, RawJoint, RawModel, RawParam, RawValue};
 use super::source::{Findings, Span, Spanned};
 use super::words::quote;
-use super::{Base, ImportOptions};
+use super::{Base, ImportOptions, ReadFile};
 
 const KEYS: &[&str] = &[
-    "name", "checks", "gravity", "params", "body", "joint", "frame", "wrench", "loop", "coupling", "shape", "contact",
-    "contacts", "variant",
+    "name", "base", "checks", "gravity", "params", "body", "joint", "frame", "wrench", "loop", "coupling", "shape",
+    "contact", "contacts", "variant",
 ];
 
-/// Reads a model without checking the mechanism; `None` where the text is no TOML. The base in `options` has to be the
-/// default, gravity replaces that of the file.
-pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings) -> Option<RawModel> {
+/// Reads a model without checking the mechanism; `None` where the text is no TOML, or the `[base]` that it names cannot be
+/// read. Without one, the options have to be the defaults; gravity replaces that of the file.
+pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings, files: ReadFile) -> Option<RawModel> {
+    let mut raw = document(text, options, findings, Some(files))?;
+    if let Some(g) = options.gravity {
+        raw.gravity = Some(override_gravity(g, findings));
+    }
+    Some(raw)
+}
+
+/// Reports options that a model without `[base]` states itself.
+fn refuse_options(options: &ImportOptions, findings: &mut Findings) {
     if options.base != Base::default() {
         let help = "leave the option out; in the file the joints to `ground` say how the model is attached";
         findings.error(Span::FILE, "a TOML model states its own base", help);
@@ -34,11 +45,6 @@ pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings) -> Opt
         let help = "leave these options out; in the file, `limits`, `[[shape]]` and `[[contact]]` describe them";
         findings.error(Span::FILE, "a TOML model states its own limits and contacts", help);
     }
-    let mut raw = document(text, findings)?;
-    if let Some(g) = options.gravity {
-        raw.gravity = Some(override_gravity(g, findings));
-    }
-    Some(raw)
 }
 
 fn override_gravity(g: [f64; 3], findings: &mut Findings) -> RawGravity {
@@ -48,7 +54,8 @@ fn override_gravity(g: [f64; 3], findings: &mut Findings) -> RawGravity {
     RawGravity::Constant(Spanned::new(g.map(|x| Spanned::new(RawValue::Const(x), Span::FILE)), Span::FILE))
 }
 
-fn document(text: &str, findings: &mut Findings) -> Option<RawModel> {
+/// Reads a text, and with `files` the one that it names as its base.
+fn document(text: &str, options: &ImportOptions, findings: &mut Findings, files: Option<ReadFile>) -> Option<RawModel> {
     let document = match DeTable::parse(text) {
         Ok(document) => document,
         Err(error) => {
@@ -57,27 +64,45 @@ fn document(text: &str, findings: &mut Findings) -> Option<RawModel> {
         }
     };
     let top = Table::new(document.get_ref(), Span::FILE, String::new());
-    let mut raw = RawModel::empty();
     top.reject_unknown(KEYS, "a model", findings);
-    raw.name = top.text("name", findings);
-    raw.lenient = top.choice("checks", &["strict", "lenient"], findings).is_some_and(|choice| choice.value == 1);
-    raw.gravity = top.get("gravity").and_then(|(span, value)| gravity(&top, span, value, findings));
+    let mut raw = match (top.table("base", findings), files) {
+        (Some(table), Some(files)) => base::read(&table, options, findings, files)?,
+        (Some(table), None) => {
+            let help =
+                "name the file that it changes as the base, or convert it: `mbd convert FILE.toml -o WHOLE.toml`";
+            findings.error(table.span, "the base of a model has a `[base]` itself", help);
+            return None;
+        }
+        (None, None) => RawModel::empty(),
+        (None, Some(_)) => {
+            refuse_options(options, findings);
+            RawModel::empty()
+        }
+    };
+    let mut known = Known::of(&raw);
+    raw.name = top.text("name", findings).or(raw.name);
+    if let Some(checks) = top.choice("checks", &["strict", "lenient"], findings) {
+        raw.lenient = checks.value == 1;
+    }
+    let stated = top.get("gravity").and_then(|(span, value)| gravity(&top, span, value, findings));
+    raw.gravity = stated.or(raw.gravity);
     if let Some(table) = top.table("params", findings) {
         params(&table, &mut raw, findings);
     }
-    parts(&top, &[], &mut raw, findings);
+    parts(&top, &[], &mut known, &mut raw, findings);
     contacts::surfaces(&top, &mut raw, findings);
     variants::all(&top, &mut raw, findings);
     Some(raw)
 }
 
-/// All that stands in lists: bodies, joints and what refers to them. `joints` are known besides those in the table.
-fn parts(top: &Table, joints: &[RawJoint], raw: &mut RawModel, findings: &mut Findings) {
+/// All that stands in lists: bodies, joints and what refers to them. `joints` are known besides those in the table, and
+/// what is `known` of the model is changed.
+fn parts(top: &Table, joints: &[RawJoint], known: &mut Known, raw: &mut RawModel, findings: &mut Findings) {
     for table in top.tables("body", findings) {
-        entries::body(table, raw, findings);
+        entries::body(table, known, raw, findings);
     }
     for table in top.tables("joint", findings) {
-        entries::joint(table, raw, findings);
+        entries::joint(table, known, raw, findings);
     }
     for table in top.tables("frame", findings) {
         entries::frame(table, raw, findings);
@@ -112,7 +137,10 @@ fn params(table: &Table, raw: &mut RawModel, findings: &mut Findings) {
     for (name, value) in entries {
         let what = format!("parameter {}", quote(name.value));
         let default = numbers::default_value(value, &what, findings);
-        raw.params.push(RawParam { name: Spanned::new(name.value.to_string(), name.span), default });
+        match raw.params.iter_mut().find(|param| param.name.value == *name.value) {
+            Some(of_base) => of_base.default = default,
+            None => raw.params.push(RawParam { name: Spanned::new(name.value.to_string(), name.span), default }),
+        }
     }
 }
 

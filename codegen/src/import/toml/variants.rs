@@ -2,6 +2,7 @@
 
 use super::super::raw::{RawModel, RawVariant};
 use super::super::source::{Findings, Spanned};
+use super::base::Known;
 use super::table::Table;
 
 const VARIANT: &[&str] =
@@ -25,6 +26,6 @@ fn variant(table: &Table, raw: &RawModel, findings: &mut Findings) -> Option<Raw
     let cut = names("cut", "`cut = [\"joint\"]`, names of joints, loops, couplings or contacts");
     let lock = names("lock", "`lock = [\"joint\"]`, names of joints");
     let mut added = RawModel::empty();
-    super::parts(table, &raw.joints, &mut added, findings);
+    super::parts(table, &raw.joints, &mut Known::default(), &mut added, findings);
     Some(RawVariant { name: name?, remove, cut, lock, added })
 }

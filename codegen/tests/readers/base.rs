@@ -1,0 +1,86 @@
+//! Descriptions that change another one: `[base]`.
+
+use std::io::{Error, ErrorKind};
+use std::path::Path;
+
+use mbd_codegen::diag::Severity;
+use mbd_codegen::model::{JointKind, Model, Value};
+use mbd_codegen::read::{load_with, to_toml, ImportOptions};
+
+const ROBOT: &str = "<?xml version=\"1.0\"?>\n<robot name='arm'>\n<link name='base'/>\n<link name='upper'>\
+<inertial><origin xyz='0 0 0.2'/><mass value='2'/><inertia ixx='0.02' iyy='0.02' izz='0.01' ixy='0' ixz='0' iyz='0'/>\
+</inertial></link>\n<joint name='shoulder' type='continuous'><parent link='base'/><child link='upper'/>\
+<axis xyz='0 1 0'/></joint>\n</robot>\n";
+
+/// Reads a text in the folder `robots`, where there are `arm.urdf` and `whole.toml`.
+fn read(text: &str) -> (Option<Model>, String, Vec<Severity>) {
+    let files = |path: &Path| match path.to_string_lossy().replace('\\', "/").as_str() {
+        "robots/arm.urdf" => Ok(ROBOT.to_string()),
+        "robots/broken.urdf" => {
+            Ok(ROBOT.replace("'0.02' ixy", "'-0.02' ixy").replace("mass value='2'", "mass value='x'"))
+        }
+        "robots/nested.toml" => Ok("[base]\nfile = 'arm.urdf'\n".to_string()),
+        _ => Err(Error::new(ErrorKind::NotFound, "no such file")),
+    };
+    let (read, findings) = load_with("robots/changed.toml", text, &ImportOptions::default(), &files);
+    let severities = findings.0.iter().map(|d| d.severity).collect();
+    (read.map(|(model, _)| model), findings.to_string(), severities)
+}
+
+#[test]
+fn a_base_is_changed_and_added_to() {
+    let (plain, ..) = read("[base]\nfile = 'arm.urdf'\n");
+    let (direct, _) =
+        load_with("arm.urdf", ROBOT, &ImportOptions::default(), &|_| Err(Error::from(ErrorKind::NotFound)));
+    assert_eq!(plain, direct.map(|(model, _)| model), "nothing is changed");
+
+    let text = "[base]\nfile = 'arm.urdf'\nroot = 'floating'\n[params]\nload = 3\n\
+        [[body]]\nname = 'upper'\nmass = { param = 'load' }\n\
+        [[joint]]\nname = 'shoulder'\narmature = 0.1\ndamping = 0.5\nlimits = { deg = [-90, 90] }\n\
+        [[body]]\nname = 'hand'\nmass = 0.5\ncom = [0, 0, 0.05]\n\
+        [[joint]]\nname = 'wrist'\ntype = 'prismatic'\nparent = 'upper'\nchild = 'hand'\n\
+        [[frame]]\nname = 'tip'\nbody = 'upper'\nxyz = [0, 0, 0.4]\n";
+    let (model, findings, _) = read(text);
+    let model = model.expect(&findings);
+    assert_eq!(model.name, "arm");
+    assert_eq!(model.joints.iter().map(|j| j.name.as_str()).collect::<Vec<_>>(), ["root_joint", "shoulder", "wrist"]);
+    assert_eq!(model.joints[0].kind, JointKind::Floating);
+    let shoulder = &model.joints[1];
+    assert_eq!(shoulder.kind, JointKind::Revolute { axis: [0.0, 1.0, 0.0] });
+    assert_eq!((shoulder.armature.as_slice(), shoulder.unbounded), (&[Value::Const(0.1)][..], true));
+    let upper = model.bodies.iter().find(|b| b.name == "upper").expect("the body");
+    assert_eq!((upper.mass, upper.com[2]), (Value::Param(0), Value::Const(0.2)));
+    assert_eq!((model.frames.len(), model.contacts.len()), (1, 2));
+}
+
+#[test]
+fn findings_name_the_file_they_are_about() {
+    let (model, findings, _) = read("[base]\nfile = 'broken.urdf'\n[[frame]]\nname = 'tip'\nbody = 'uper'\n");
+    assert!(model.is_none());
+    for text in ["robots/changed.toml:5:8: error: frame `tip`", "robots/broken.urdf:4:6", "did you mean `upper`?"] {
+        assert!(findings.contains(text), "{text}: {findings}");
+    }
+    for (text, expected) in [
+        (
+            "[base]\nfile = 'none.urdf'\n",
+            "robots/changed.toml:2:8: error: cannot read the base `none.urdf`: no such file",
+        ),
+        ("[base]\nfile = 'arm.sdf'\n", "cannot read the base"),
+        ("[base]\n", "`file`"),
+        ("[base]\nfile = 'nested.toml'\n", "robots/nested.toml:1:1: error: the base of a model has a `[base]` itself"),
+        ("[base]\nfile = 'arm.urdf'\nroot = 'flying'\n", "`root` cannot be `flying`"),
+        ("[base]\nfile = 'arm.urdf'\n[[joint]]\nname = 'elbow'\ndamping = 1\n", "robots/changed.toml:3:1: error"),
+    ] {
+        let (model, findings, severities) = read(text);
+        assert!(model.is_none() && severities.contains(&Severity::Error), "{text}: {findings}");
+        assert!(findings.contains(expected), "{expected}: {findings}");
+    }
+}
+
+#[test]
+fn a_changed_robot_is_converted_whole() {
+    let files = |_: &Path| Ok(ROBOT.to_string());
+    let text = "[base]\nfile = 'arm.urdf'\n[[joint]]\nname = 'shoulder'\narmature = 0.1\n";
+    let (toml, _) = to_toml("changed.toml", text, &ImportOptions::default(), &files).expect("a sound model");
+    assert!(toml.contains("armature = 0.1") && !toml.contains("[base]"), "{toml}");
+}
