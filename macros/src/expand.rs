@@ -27,7 +27,7 @@ pub fn expand(input: TokenStream) -> TokenStream {
     let mut watched = TokenStream::new();
     let (mut model, mut all) = (None, None);
     if let Some(text) = &text {
-        let (read, findings, base) = text.load(&args);
+        let Loaded { read, findings, base } = text.load(&args);
         watched.extend(base.as_deref().map(tracked));
         all = read.clone();
         model = read.and_then(|(model, variants)| {
@@ -143,6 +143,15 @@ fn similar_file(file: &Path, path: &str) -> String {
     }
 }
 
+/// What is read from a description.
+struct Loaded {
+    /// The model and its variants, if there is no error.
+    read: Option<(Model, Vec<Variant>)>,
+    findings: Vec<Diagnostic>,
+    /// The file that the description names as its base.
+    base: Option<PathBuf>,
+}
+
 impl Text {
     fn is_toml(&self) -> bool {
         Path::new(&self.label).extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"))
@@ -159,8 +168,8 @@ impl Text {
         (format!("{at}{}", d.message), d.help.clone())
     }
 
-    /// The model and its variants, the findings, and the file that the description names as its base.
-    fn load(&self, args: &Args) -> (Option<(Model, Vec<Variant>)>, Vec<Diagnostic>, Option<PathBuf>) {
+    /// Reads the description.
+    fn load(&self, args: &Args) -> Loaded {
         let read_base = RefCell::new(None);
         let files = |path: &Path| {
             let root = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from).unwrap_or_default();
@@ -173,8 +182,8 @@ impl Text {
         // This is reported at the argument itself.
         let base = if self.is_toml() { Base::default() } else { base };
         let options = ImportOptions { base, gravity: args.gravity, ..ImportOptions::default() };
-        let (model, findings) = load_with(&self.label, &self.text, &options, &files);
-        (model, findings.0, read_base.take())
+        let (read, findings) = load_with(&self.label, &self.text, &options, &files);
+        Loaded { read, findings: findings.0, base: read_base.take() }
     }
 
     /// Makes the compiler read the file again when it changes.
