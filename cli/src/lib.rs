@@ -6,6 +6,7 @@
 mod args;
 mod certify;
 mod check;
+mod completions;
 mod condition;
 mod contacts;
 mod convert;
@@ -111,5 +112,6 @@ fn run(command: Option<Command>, out: &mut dyn Write) -> Outcome {
         Some(Command::Modes(a)) => modes::run(&a, out),
         Some(Command::Explain(a)) => explain::run(&a, out),
         Some(Command::Identifiable(a)) => identifiable::run(&a, out),
+        Some(Command::Completions(a)) => completions::run(&a, out),
     }
 }

@@ -68,6 +68,8 @@ pub enum Command {
     Explain(ExplainArgs),
     /// Name the combinations of masses and inertias that a motion can identify
     Identifiable(IdentifiableArgs),
+    /// Print completions for a shell, or the manual page
+    Completions(CompletionsArgs),
 }
 
 /// Options of the readers.
@@ -166,6 +168,36 @@ pub struct ConvertArgs {
     /// File to write in place of standard output
     #[arg(short, long)]
     pub output: Option<PathBuf>,
+}
+
+/// `mbd completions`.
+#[derive(Args)]
+#[command(after_help = "Examples:
+  mbd completions bash > ~/.local/share/bash-completion/completions/mbd
+  mbd completions zsh > ~/.zfunc/_mbd
+  mbd completions fish > ~/.config/fish/completions/mbd.fish
+  mbd completions man > ~/.local/share/man/man1/mbd.1")]
+pub struct CompletionsArgs {
+    /// What to print
+    #[arg(value_enum)]
+    pub what: Completions,
+}
+
+/// What `mbd completions` prints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Completions {
+    /// Completions for bash
+    Bash,
+    /// Completions for elvish
+    Elvish,
+    /// Completions for fish
+    Fish,
+    /// Completions for PowerShell
+    Powershell,
+    /// Completions for zsh
+    Zsh,
+    /// The manual page, in roff
+    Man,
 }
 
 /// `mbd count`.

@@ -510,3 +510,27 @@ fn robots_are_added_to() {
     std::fs::remove_file(folder.join("ur5.urdf")).expect("the copy");
     bad(run_in(&folder, &["check", "tool.toml"]), &["tool.toml:7:8: error: cannot read the base `ur5.urdf`"]);
 }
+
+#[test]
+fn shells_complete() {
+    let names: Vec<String> = {
+        let help = good(run(&["--help"]));
+        let commands = out(&help).split_once("Commands:").expect("a list of commands").1.to_string();
+        let words = commands.lines().skip(1).map_while(|line| line.split_whitespace().next().map(String::from));
+        words.filter(|word| word != "help").collect()
+    };
+    assert!(names.len() >= 11, "{names:?}");
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh", "man"] {
+        let output = good(run(&["completions", shell]));
+        for name in &names {
+            assert!(out(&output).contains(name), "{shell}: {name}");
+        }
+        assert!(out(&output).contains("tolerance"), "{shell}");
+    }
+    if is_there("bash") {
+        let script = "source <(\"$0\" completions bash); COMP_WORDS=(mbd simulate --tol); COMP_CWORD=2; _mbd mbd --tol simulate; \
+                      echo \"${COMPREPLY[@]}\"";
+        let output = Command::new("bash").args(["-c", script, env!("CARGO_BIN_EXE_mbd")]).output().expect("bash");
+        assert!(out(&output).contains("--tolerance"), "{} {}", out(&output), err(&output));
+    }
+}
