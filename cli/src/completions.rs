@@ -26,7 +26,7 @@ pub fn run(args: &CompletionsArgs, out: &mut dyn Write) -> Outcome {
             whole.render_description_section(&mut page)?;
             whole.render_options_section(&mut page)?;
             for sub in command.get_subcommands().filter(|sub| sub.get_name() != "help") {
-                writeln!(page, ".SH \"MBD {}\"", sub.get_name().to_uppercase())?;
+                writeln!(page, ".SH \"mbd {}\"", sub.get_name())?;
                 let sub = clap_mangen::Man::new(sub.clone());
                 sub.render_description_section(&mut page)?;
                 sub.render_options_section(&mut page)?;
