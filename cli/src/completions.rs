@@ -4,11 +4,12 @@ use std::io::Write;
 
 use clap::CommandFactory;
 use clap_complete::{generate, Shell};
+use multibody::codegen::read::json_schema;
 
 use super::args::{Arguments, Completions, CompletionsArgs};
 use super::Outcome;
 
-/// Prints completions for a shell, or the manual page.
+/// Prints completions for a shell or an editor, or the manual page.
 pub fn run(args: &CompletionsArgs, out: &mut dyn Write) -> Outcome {
     let mut command = Arguments::command();
     let shell = match args.what {
@@ -17,6 +18,7 @@ pub fn run(args: &CompletionsArgs, out: &mut dyn Write) -> Outcome {
         Completions::Fish => Shell::Fish,
         Completions::Powershell => Shell::PowerShell,
         Completions::Zsh => Shell::Zsh,
+        Completions::Schema => return Ok(out.write_all(json_schema().as_bytes())?),
         Completions::Man => {
             // One page holds all commands.
             let (mut page, whole) = (Vec::new(), clap_mangen::Man::new(command.clone()));

@@ -203,6 +203,11 @@ fn raw_model(
     }
 }
 
+/// A JSON Schema (draft 4) of the TOML format, for editors.
+pub fn json_schema() -> String {
+    toml::schema()
+}
+
 /// A description of any format as one of the TOML format, which parameters, loops, frames and the rest can be added to.
 /// The text is read back and compared: it describes an equal model, with equal variants. Comments are lost. With the text
 /// come the warnings and notices about the source. A `[base]` is read by `files` and becomes part of the text.

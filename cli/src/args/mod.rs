@@ -68,7 +68,7 @@ pub enum Command {
     Explain(ExplainArgs),
     /// Name the combinations of masses and inertias that a motion can identify
     Identifiable(IdentifiableArgs),
-    /// Print completions for a shell, or the manual page
+    /// Print completions for a shell or an editor, or the manual page
     Completions(CompletionsArgs),
 }
 
@@ -176,7 +176,9 @@ pub struct ConvertArgs {
   mbd completions bash > ~/.local/share/bash-completion/completions/mbd
   mbd completions zsh > ~/.zfunc/_mbd
   mbd completions fish > ~/.config/fish/completions/mbd.fish
-  mbd completions man > ~/.local/share/man/man1/mbd.1")]
+  mbd completions man > ~/.local/share/man/man1/mbd.1
+  mbd completions schema > model.schema.json           a model that begins with `#:schema model.schema.json` is then
+                                                       completed and checked by editors that know Taplo")]
 pub struct CompletionsArgs {
     /// What to print
     #[arg(value_enum)]
@@ -198,6 +200,8 @@ pub enum Completions {
     Zsh,
     /// The manual page, in roff
     Man,
+    /// A JSON Schema (draft 4) of the TOML format of models, for editors
+    Schema,
 }
 
 /// `mbd count`.

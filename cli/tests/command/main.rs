@@ -8,5 +8,6 @@ mod documented;
 mod eval;
 mod loops;
 mod run;
+mod schema;
 mod trust;
 mod webassembly;

@@ -9,7 +9,7 @@ use crate::import::source::{Findings, Span};
 use crate::import::words::quote;
 use crate::import::{urdf, Base, ImportOptions, ReadFile};
 
-const KEYS: &[&str] = &["file", "root", "limits"];
+pub(super) const KEYS: &[&str] = &["file", "root", "limits"];
 
 /// Bodies and joints that are changed where they are named again, by their indices.
 #[derive(Default)]

@@ -10,7 +10,7 @@ use super::numbers::{self, Unit};
 use super::table::Table;
 use crate::model::{LoopSpec, NumberKey, Unit as Measures, FLOATING, LOOPS};
 
-const COUPLING: &[&str] = &["name", "joints", "ratios", "offset", "decay"];
+pub(super) const COUPLING: &[&str] = &["name", "joints", "ratios", "offset", "decay"];
 
 /// The entry of a coupling.
 const COUPLINGS: [&str; 4] = ["coupling", "gear", "gears", "rack"];
@@ -32,12 +32,25 @@ pub(super) fn all(top: &Table, joints: &[RawJoint], raw: &mut RawModel, findings
     raw.constraints.extend(found.into_iter().map(|(_, c)| c));
 }
 
+/// Keys of directions of all types of loops.
+fn direction_keys() -> Vec<&'static str> {
+    distinct(LOOPS.iter().flat_map(|spec| spec.directions.iter().map(|d| d.key)))
+}
+
+/// Keys of numbers of all types of loops.
+fn number_keys() -> Vec<NumberKey> {
+    distinct(LOOPS.iter().flat_map(|spec| spec.numbers.iter().copied()))
+}
+
+/// Keys of all types of loops.
+pub(super) fn loop_keys() -> Vec<&'static str> {
+    let numbers: Vec<&str> = number_keys().iter().map(|n| n.key).collect();
+    [&["name", "type", "between"], &direction_keys()[..], &numbers[..], &["decay"]].concat()
+}
+
 fn one_loop(table: &Table, findings: &mut Findings) -> Option<RawLoop> {
-    let directions = distinct(LOOPS.iter().flat_map(|spec| spec.directions.iter().map(|d| d.key)));
-    let numbers = distinct(LOOPS.iter().flat_map(|spec| spec.numbers.iter().copied()));
-    let named: Vec<&str> = numbers.iter().map(|n| n.key).collect();
-    let keys = [&["name", "type", "between"], &directions[..], &named[..], &["decay"]].concat();
-    table.reject_unknown(&keys, "a loop", findings);
+    let (directions, numbers) = (direction_keys(), number_keys());
+    table.reject_unknown(&loop_keys(), "a loop", findings);
     let name = table.required_text("name", findings);
     let kind = loop_type(table, findings);
     let between = between(table, "bodies, frames or `ground`", findings);

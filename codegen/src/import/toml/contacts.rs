@@ -11,10 +11,10 @@ use super::numbers::Unit;
 use super::table::Table;
 use crate::model::SHAPES;
 
-const SHAPE: &[&str] =
+pub(super) const SHAPE: &[&str] =
     &["name", "body", "type", "xyz", "rpy", "rotate", "radius", "length", "size", "semi_axes", "normal"];
-const CONTACT: &[&str] = &["name", "between", "friction", "restitution", "law"];
-const CONTACTS: &[&str] = &["pairs", "friction", "restitution", "law"];
+pub(super) const CONTACT: &[&str] = &["name", "between", "friction", "restitution", "law"];
+pub(super) const CONTACTS: &[&str] = &["pairs", "friction", "restitution", "law"];
 
 /// The laws of restitution by their words.
 pub(super) const LAWS: [(&str, RestitutionLaw); 3] =

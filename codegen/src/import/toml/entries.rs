@@ -12,8 +12,8 @@ use super::table::Table;
 use crate::model::{JointSpec, WrenchAxes, JOINTS, REVOLUTE};
 use ::toml::de::DeValue;
 
-const BODY: &[&str] = &["name", "mass", "com", "inertia", "inertia_rpy"];
-const JOINT: &[&str] = &[
+pub(super) const BODY: &[&str] = &["name", "mass", "com", "inertia", "inertia_rpy"];
+pub(super) const JOINT: &[&str] = &[
     "name",
     "type",
     "parent",
@@ -37,8 +37,8 @@ const JOINT: &[&str] = &[
     "limits",
     "limit_restitution",
 ];
-const FRAME: &[&str] = &["name", "body", "xyz", "rpy", "rotate"];
-const WRENCH: &[&str] = &["name", "body", "frame"];
+pub(super) const FRAME: &[&str] = &["name", "body", "xyz", "rpy", "rotate"];
+pub(super) const WRENCH: &[&str] = &["name", "body", "frame"];
 pub(super) const INERTIA: [&str; 6] = ["xx", "yy", "zz", "xy", "xz", "yz"];
 
 pub(super) fn body(table: Table, known: &mut Known, raw: &mut RawModel, findings: &mut Findings) {

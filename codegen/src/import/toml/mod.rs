@@ -6,6 +6,7 @@ mod contacts;
 mod entries;
 mod kinds;
 mod numbers;
+mod schema;
 mod table;
 mod variants;
 mod write;
@@ -13,6 +14,7 @@ mod write;
 use ::toml::de::{DeTable, DeValue, Error};
 
 use self::base::Known;
+pub use self::schema::schema;
 use self::table::Table;
 pub use self::write::write;
 use super::raw::{RawGravity, RawJoint, RawModel, RawParam, RawValue};

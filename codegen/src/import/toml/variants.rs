@@ -5,7 +5,7 @@ use super::super::source::{Findings, Spanned};
 use super::base::Known;
 use super::table::Table;
 
-const VARIANT: &[&str] =
+pub(super) const VARIANT: &[&str] =
     &["name", "remove", "cut", "lock", "body", "joint", "frame", "wrench", "loop", "coupling", "shape", "contact"];
 
 /// All variants, in the order of the file.
