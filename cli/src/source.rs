@@ -7,7 +7,7 @@ use multibody::codegen::diag::Diagnostics;
 use multibody::codegen::model::{Model, Wrench, WrenchAxes};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
-use multibody::codegen::read::{load_variant, load_with, ImportOptions, Variant};
+use multibody::codegen::read::{load_variant, load_with, read_text, ImportOptions, Variant};
 use multibody::codegen::search::{self, Chosen};
 use multibody::codegen::words;
 use multibody::runtime::interp::MassMatrixError;
@@ -67,7 +67,7 @@ pub fn models(path: &Path, options: &ImportOptions) -> Outcome<(Model, Vec<Varia
 /// The text of the base that a description names.
 pub fn base(path: &Path) -> std::io::Result<String> {
     is_input(path);
-    std::fs::read_to_string(path)
+    read_text(path)
 }
 
 /// What is read from a file, with the findings told.

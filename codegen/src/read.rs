@@ -1,5 +1,6 @@
 //! Reading a description: text to a raw model by its format, then the checks. The one door to both.
 
+use std::io::Read;
 use std::path::Path;
 
 use crate::check::{changed, check};
@@ -146,7 +147,23 @@ pub fn load_variant(
 
 /// [`load`], with all variants.
 pub fn load_all(file: &str, text: &str, options: &ImportOptions) -> (Option<(Model, Vec<Variant>)>, Diagnostics) {
-    load_with(file, text, options, &|path| std::fs::read_to_string(path))
+    load_with(file, text, options, &read_text)
+}
+
+/// Largest size of a description, bytes. None is as long, but a device file may be endless.
+const LONGEST: u64 = 256 << 20;
+
+/// Reads the text of a file of at most 256 MiB.
+///
+/// # Errors
+/// Those of reading, and a longer file.
+pub fn read_text(path: &Path) -> std::io::Result<String> {
+    let mut text = String::new();
+    let length = std::fs::File::open(path)?.take(LONGEST + 1).read_to_string(&mut text)?;
+    if length as u64 > LONGEST {
+        return Err(std::io::Error::other(format!("it is longer than {} MiB", LONGEST >> 20)));
+    }
+    Ok(text)
 }
 
 /// [`load_all`], with the `[base]` of a TOML text read by `files`, to which its path is given as it is relative to

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use mbd_codegen::diag::{Diagnostic, Severity};
 use mbd_codegen::model::Model;
 use mbd_codegen::modes::{parse, ModeChoice};
-use mbd_codegen::read::{chosen, load_with, Base, ImportOptions, Variant};
+use mbd_codegen::read::{chosen, load_with, read_text, Base, ImportOptions, Variant};
 use mbd_codegen::words::{closest, did_you_mean, list, quote};
 use mbd_codegen::{generate, transfer_code, Output};
 use proc_macro2::{Group as Tokens, Ident, Literal, Span, TokenStream, TokenTree};
@@ -174,7 +174,7 @@ impl Text {
         let files = |path: &Path| {
             let root = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from).unwrap_or_default();
             let file = root.join(path);
-            let text = std::fs::read_to_string(&file)?;
+            let text = read_text(&file)?;
             *read_base.borrow_mut() = Some(file);
             Ok(text)
         };
