@@ -18,11 +18,13 @@ use multibody::runtime::contact::{
 use multibody::runtime::integrate::Statistics;
 use multibody::runtime::Conjugate;
 
-use super::motion::{set_gravity, Record, Settings};
+use super::control::{Driven, Loads};
+use super::interrupt;
+use super::motion::{set_gravity, Progress, Record, Settings};
 use super::{Failure, Outcome};
 
 /// A mechanism with contacts: machine code for the modes that a motion stays in, the interpreter for the others.
-type Mechanism = ModeTable<Compiled>;
+type Mechanism = ModeTable<Driven>;
 type System = WithContacts<Mechanism>;
 
 /// Number of events that are printed.
@@ -94,6 +96,12 @@ impl Observer {
         record.v.push(v);
         record.p.push(self.p.clone());
         record.energy.push(energy);
+        record.loads.motion(t, &self.q, record.v.last().map_or(&[][..], |v| v));
+        if let Some(control) = mechanism.control() {
+            let efforts = control.behind(t, || mechanism.efforts(t, &self.q, &self.p));
+            record.loads.efforts(self.every, &efforts, |k| control.limited(k));
+            record.efforts.push(efforts);
+        }
         let change = energy.0 + energy.1 - (record.energy[0].0 + record.energy[0].1);
         record.ends.t.push(t);
         record.ends.change.push(change);
@@ -144,19 +152,19 @@ fn projection(settings: &Settings, system: &System) -> Projection<System> {
 }
 
 /// A mechanism with contacts, in exact arithmetic, so that machine code gives the bits of the interpreter.
-fn mechanism(plan: &Plan, interpreted: bool) -> Outcome<Mechanism> {
+fn mechanism(plan: &Plan, settings: &Settings) -> Outcome<Mechanism> {
     let options = Options { arithmetic: Arithmetic::Exact, ..Options::default() };
-    let calls = if interpreted { u32::MAX } else { Compiled::<f64>::WORTHWHILE };
-    let mut mechanism = plan
-        .compiled_with_contacts(&options, calls)
+    let calls = if settings.interpreted { u32::MAX } else { Compiled::<f64>::WORTHWHILE };
+    let full = Compiled::from_plan(plan.with_contacts(), options.of_model(true))
         .map_err(|e| Failure::new(e.to_string(), "simulate with --interpreted"))?;
+    let mut mechanism = ModeTable::new(settings.driven(full.compiled_after(calls)), plan.contacts());
     set_gravity(plan, mechanism.inputs());
     Ok(mechanism)
 }
 
 /// Simulates from given coordinates and velocities. `with_forces` keeps the forces of the contacts at all rows.
 pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, with_forces: bool) -> Outcome<Touched> {
-    let mut mechanism = mechanism(plan, settings.interpreted)?;
+    let mut mechanism = mechanism(plan, settings)?;
     mechanism.inputs().check_rank(&q).map_err(|e| super::source::rank_failure(&e))?;
     let mut p = v.clone();
     mechanism.conjugate_momenta(&q, &v, &mut p);
@@ -164,7 +172,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
     let method = method(settings, &system)?;
     let failed = |e: HybridError| failure(plan, &e);
     let mut observer = Observer {
-        record: Record::default(),
+        record: Record { loads: Loads::new(plan, settings.control.is_some()), ..Record::default() },
         events: Vec::new(),
         changes: Vec::new(),
         visits: Vec::new(),
@@ -180,7 +188,21 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
     let (close, rules, start) = (projection(settings, &system), settings.regimes, (&q, &p));
     let motion = ContactMotion::new(&mut system, (method, settings.step), close, rules, 0.0, start);
     let mut motion = motion.map_err(failed)?;
-    motion.run(&mut system, settings.time, &mut observer).map_err(failed)?;
+    let mut progress = Progress::new(settings.time);
+    for until in settings.instants() {
+        while motion.time() < until && !interrupt::asked() {
+            motion.advance(&mut system, until, &mut observer).inspect_err(|_| progress.clear()).map_err(failed)?;
+            progress.show(motion.time());
+        }
+        if let Some(control) = settings.control.as_ref().filter(|_| until < settings.time) {
+            control.enter(until);
+            if control.jumps() {
+                motion.resume(&mut system).map_err(failed)?;
+            }
+        }
+    }
+    progress.clear();
+    observer.record.interrupted = (motion.time() < settings.time).then_some(motion.time());
     let statistics: Statistics = motion.integration_statistics();
     let (modes, count) = (system.modes().iter().copied().enumerate(), system.modes().len());
     Ok(Touched {
@@ -377,7 +399,7 @@ pub fn table(plan: &Plan, events: &[ContactEvent<f64>]) -> String {
             text,
             "{},{},{what},{then},{},{energy}",
             event.time,
-            super::simulate::quoted(name(plan, event.contact)),
+            super::columns::quoted(name(plan, event.contact)),
             event.approach
         );
     }

@@ -40,6 +40,7 @@ pub struct Balance {
     /// rates of the momenta of the constrained mechanism have the forces of the constraints among them.
     tree: Option<Compiled>,
     damped: bool,
+    controlled: bool,
     /// Damping of every velocity, N m s/rad or N s/m.
     damping: Vec<f64>,
     /// Energy at the start.
@@ -48,8 +49,8 @@ pub struct Balance {
     last: f64,
     /// What it allows for all steps together.
     allowed: f64,
-    /// Work of the dampers so far, negative.
-    work: f64,
+    /// Work of the dampers so far, negative, and of the control.
+    works: [f64; 2],
     /// How uncertain that work is.
     doubt: f64,
     /// Change of the energy minus the work at the last end of a step, and the largest one.
@@ -84,36 +85,51 @@ impl Balance {
             tolerances,
             tree,
             damped,
+            controlled: settings.control.is_some(),
             damping: parameters[end - 2 * nv..end - nv].to_vec(),
             ..Balance::default()
         })
     }
 
-    /// Whether dampers take energy.
-    pub fn damped(&self) -> bool {
-        self.damped
+    /// Whether dampers or control change the energy.
+    pub fn changes(&self) -> bool {
+        self.damped || self.controlled
     }
 
-    /// Adds the work of the dampers in a step of `h` s, from the states of its dense output.
-    pub fn dissipate(&mut self, mechanism: &mut Compiled, h: f64, mut dense: impl FnMut(f64) -> (Vec<f64>, Vec<f64>)) {
+    /// Adds the work of dampers and control in a step of `h` s. At a part of the step, `dense` gives the state and the power
+    /// of the control, which counts with a weight.
+    pub fn work(
+        &mut self,
+        mechanism: &mut Compiled,
+        h: f64,
+        mut dense: impl FnMut(f64, f64) -> (Vec<f64>, Vec<f64>, f64),
+    ) {
         let mut v = mechanism.zero_momenta();
-        let mut half = |from: f64| -> f64 {
-            let powers = GAUSS.iter().map(|(node, weight)| {
-                let (q, p) = dense(from + 0.5 * node);
+        let mut half = |from: f64| -> [f64; 2] {
+            let mut works = [0.0; 2];
+            for (node, weight) in GAUSS {
+                let (q, p, power) = dense(from + 0.5 * node, 0.5 * weight);
                 mechanism.velocities(&q, &p, &mut v);
-                -weight * v.iter().zip(&self.damping).map(|(v, d)| d * v * v).sum::<f64>()
-            });
-            0.5 * h * powers.sum::<f64>()
+                works[0] -= 0.5 * h * weight * v.iter().zip(&self.damping).map(|(v, d)| d * v * v).sum::<f64>();
+                works[1] += 0.5 * h * weight * power;
+            }
+            works
         };
         let (first, second) = (half(0.0), half(0.5));
         // The balance at the middle of the step shows the error of the dense output there. The power follows the
         // kinetic energy, so that the work is uncertain by that error times the part of the energy it takes.
-        let (q, p) = dense(0.5);
+        let (q, p, _) = dense(0.5, 0.0);
         let (kinetic, potential) = mechanism.energy(&q, &p);
-        let middle = (self.defect(kinetic + potential, self.work + first) - self.defect).abs();
-        let part = ((first + second).abs() / kinetic.max(f64::MIN_POSITIVE)).min(1.0);
-        self.work += first + second;
+        let middle = (self.defect(kinetic + potential, self.total() + first[0] + first[1]) - self.defect).abs();
+        let moved = [0, 1].map(|k| (first[k] + second[k]).abs());
+        let part = ((moved[0] + moved[1]) / kinetic.max(f64::MIN_POSITIVE)).min(1.0);
+        self.works = [0, 1].map(|k| self.works[k] + first[k] + second[k]);
         self.doubt += part * middle;
+    }
+
+    /// Work of dampers and control, J.
+    fn total(&self) -> f64 {
+        self.works[0] + self.works[1]
     }
 
     /// Change of the energy minus work, J.
@@ -131,7 +147,7 @@ impl Balance {
     ) {
         let energy = kinetic + potential;
         self.start.get_or_insert(energy);
-        self.defect = self.defect(energy, self.work);
+        self.defect = self.defect(energy, self.total());
         self.worst = self.worst.max(self.defect.abs());
         self.kinetic = self.kinetic.max(kinetic);
         self.size = self.size.max(kinetic.abs() + potential.abs());
@@ -234,11 +250,18 @@ pub fn judge(record: &Record, settings: &Settings) -> Verdict {
         let line = format!("energy error: at most {change}; --project keeps it, so that it does not measure this run");
         return Verdict { line, warning: None, lost: false };
     }
-    let mut line = match balance.damped {
-        false => format!("energy error: at most {change}"),
-        true => format!(
+    let [dampers, control] = balance.works;
+    let mut line = match (balance.damped, balance.controlled) {
+        (false, false) => format!("energy error: at most {change}"),
+        (true, false) => format!(
             "energy: changes by up to {change} (the model has dampers; --no-damping leaves them out)\nenergy error: energy and \
              work of the dampers differ by at most {:.1e} of it",
+            relative(balance.worst)
+        ),
+        (damped, true) => format!(
+            "energy: changes by up to {change}; the control does {control:.6} J of work{}\nenergy error: energy and work differ \
+             by at most {:.1e} of it",
+            if damped { format!(", dampers take {:.6} J", -dampers) } else { String::new() },
             relative(balance.worst)
         ),
     };
@@ -280,7 +303,7 @@ pub fn judge(record: &Record, settings: &Settings) -> Verdict {
             (what, format!("{raise}; --trust measures the error of the motion"))
         }),
     };
-    if balance.damped && balance.doubt > 0.0 {
+    if balance.changes() && balance.doubt > 0.0 {
         line += &format!(" (the work is known to {:.1e})", relative(balance.doubt));
     }
     Verdict { line, warning, lost }

@@ -6,9 +6,11 @@
 mod args;
 mod certify;
 mod check;
+mod columns;
 mod completions;
 mod condition;
 mod contacts;
+mod control;
 mod convert;
 mod count;
 mod displacement;
@@ -19,6 +21,7 @@ mod explain;
 mod fmu;
 mod generate;
 mod identifiable;
+mod interrupt;
 mod loops;
 mod modes;
 mod motion;
@@ -54,6 +57,8 @@ pub enum Failure {
     Shown,
     /// The reader of standard output has closed it.
     Pipe,
+    /// The user has interrupted the command, which has written what it had.
+    Interrupted,
 }
 
 impl Failure {
@@ -91,6 +96,9 @@ pub fn reported(command: impl FnOnce(&mut dyn Write) -> Outcome) -> ExitCode {
         Err(failure) => {
             // Results that were written before the failure are flushed before its message.
             let _ = out.flush();
+            if let Failure::Interrupted = failure {
+                return ExitCode::from(interrupt::STATUS);
+            }
             if let Failure::Message(what, help) = failure {
                 note(format_args!("error: {what}\n  help: {help}"));
             }

@@ -17,12 +17,15 @@ use multibody::runtime::contact::RegimeRules;
 use multibody::runtime::integrate::{Control, EnergyProjection, Solver, Statistics, Step, StepError};
 use multibody::runtime::{Constrained, Interpreter, Real, Scalar, System};
 
+use super::control::{Controller, Driven, Loads};
 use super::energy::Balance;
+use super::interrupt;
 use super::output::mentioned;
 use super::timed::Timed;
 use super::{loops, source, Failure, Outcome};
 
 /// Settings of a simulation.
+#[derive(Clone)]
 pub struct Settings<'a> {
     /// Name of the method in the catalogue.
     pub method: &'a str,
@@ -40,9 +43,26 @@ pub struct Settings<'a> {
     pub interpreted: bool,
     /// How contacts are followed.
     pub regimes: RegimeRules,
+    /// What moves the joints, if anything does.
+    pub control: Option<Rc<Controller>>,
 }
 
 impl Settings<'_> {
+    /// A mechanism with the control, of which the motion is at its start.
+    pub fn driven(&self, mechanism: Compiled) -> Driven {
+        if let Some(control) = &self.control {
+            control.enter(0.0);
+        }
+        Driven::new(mechanism, self.control.clone())
+    }
+
+    /// Times at which the control changes, and the end, s.
+    pub fn instants(&self) -> Vec<f64> {
+        let mut times = self.control.as_ref().map_or(Vec::new(), |control| control.instants(self.time));
+        times.push(self.time);
+        times
+    }
+
     /// What the ends of steps may do.
     fn effort(&self) -> Effort {
         match self.step {
@@ -68,6 +88,12 @@ pub struct Record {
     pub p: Vec<Vec<f64>>,
     /// Kinetic and potential energy, J.
     pub energy: Vec<(f64, f64)>,
+    /// Joint forces of the control, a list for each time; empty without control.
+    pub efforts: Vec<Vec<f64>>,
+    /// What the control and the motion made of the joints' bounds.
+    pub loads: Loads,
+    /// Time at which the run was interrupted, s.
+    pub interrupted: Option<f64>,
     /// Energy at the ends of steps, which has the error of the method without that of the dense output.
     pub ends: Ends,
     /// Evaluations, steps and rejections.
@@ -142,6 +168,8 @@ impl Ends {
 /// Observer of the states of a simulation.
 struct Observer {
     mechanism: Compiled,
+    /// The same with its control.
+    driven: Driven,
     record: Record,
     start: f64,
     residual: Vec<f64>,
@@ -149,14 +177,36 @@ struct Observer {
 }
 
 impl Observer {
-    fn row(&mut self, t: f64, q: &[f64], p: &[f64]) {
+    fn velocities(&mut self, q: &[f64], p: &[f64]) -> Vec<f64> {
         let mut v = vec![0.0; p.len()];
         self.mechanism.velocities(q, p, &mut v);
+        v
+    }
+
+    /// What acts in a step from `t` of `h` s, whose states `dense` gives.
+    fn work(&mut self, t: f64, h: f64, mut dense: impl FnMut(f64) -> (Vec<f64>, Vec<f64>)) {
+        let Observer { mechanism, driven, record: Record { balance, loads, .. }, .. } = self;
+        balance.work(mechanism, h, |theta, weight| {
+            let (q, p) = dense(theta);
+            let power = driven.power(t + theta * h, &q, &p);
+            if let Some(control) = driven.control().filter(|_| weight > 0.0) {
+                loads.efforts(weight * h, &driven.inputs().tau, |k| control.limited(k));
+            }
+            (q, p, power)
+        });
+    }
+
+    fn row(&mut self, t: f64, q: &[f64], p: &[f64]) {
+        let v = self.velocities(q, p);
         self.record.energy.push(self.mechanism.energy(q, p));
         self.record.t.push(t);
         self.record.v.push(v);
         self.record.q.push(q.to_vec());
         self.record.p.push(p.to_vec());
+        if let Some(control) = self.driven.control() {
+            // A row at the time of a jump is behind it.
+            self.record.efforts.push(control.behind(t, || self.driven.efforts(t, q, p)));
+        }
     }
 
     /// The end of a step of `h` s.
@@ -167,6 +217,8 @@ impl Observer {
             record.drift.left = record.drift.left.max(loops::largest(mechanism.rows(), residual));
         }
         let (kinetic, potential) = self.mechanism.energy(q, p);
+        let v = self.velocities(q, p);
+        self.record.loads.motion(t, q, &v);
         self.record.balance.step(&mut self.mechanism, h, (q, p), (kinetic, potential));
         let (change, ends) = (kinetic + potential - self.start, &mut self.record.ends);
         (ends.scale, ends.worst) = (ends.scale.max(kinetic), ends.worst.max(change.abs()));
@@ -250,7 +302,7 @@ pub fn driver(
     settings: &Settings,
     system: &mut Timed,
     step: Step,
-    (q, p): (&Vec<f64>, &Vec<f64>),
+    (t, q, p): (f64, &Vec<f64>, &Vec<f64>),
     met: &Rc<RefCell<Drift>>,
 ) -> Outcome<Driver<'static, Timed>> {
     let mut method = catalogue::any(settings.method, system, false)
@@ -259,7 +311,7 @@ pub fn driver(
         let hold = Projection::new(system, settings.hold, settings.effort());
         method = Box::new(WithPostStep::new(system, method, Keeper { hold, met: met.clone() }));
     }
-    Solver::new(system, method, step, 0.0, q, p).map_err(|e| failure(plan, settings, &e))
+    Solver::new(system, method, step, t, q, p).map_err(|e| failure(plan, settings, &e))
 }
 
 /// Simulates from given coordinates and velocities, and records the motion.
@@ -276,14 +328,19 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings) 
     let compiled = compiled.then(|| clock.elapsed().as_secs_f64());
     let mut observer = Observer {
         mechanism: mechanism.clone(),
-        record: Record { balance: Balance::new(plan, settings)?, ..Record::default() },
+        driven: settings.driven(mechanism.clone()),
+        record: Record {
+            balance: Balance::new(plan, settings)?,
+            loads: Loads::new(plan, settings.control.is_some()),
+            ..Record::default()
+        },
         start: kinetic + potential,
         residual,
         entries,
     };
-    let mut system = Timed::new(mechanism);
+    let mut system = Timed::new(settings.driven(mechanism));
     let met = Rc::new(RefCell::new(Drift::default()));
-    let mut driver = driver(plan, settings, &mut system, settings.step, (&q, &p), &met)?;
+    let mut driver = driver(plan, settings, &mut system, settings.step, (0.0, &q, &p), &met)?;
     let mut projection = settings.project.then(|| EnergyProjection::new(&mut system, &q, &p, 3));
     observer.end(0.0, 0.0, &q, &p, true);
     observer.row(0.0, &q, &p);
@@ -312,8 +369,14 @@ fn go(
     let at = |row: u64| if row < rows { row as f64 * every } else { time };
     let (mut row, mut progress) = (1, Progress::new(time));
     let (mut q, mut p) = (observer.record.q[0].clone(), observer.record.p[0].clone());
+    let mut instants = settings.instants().into_iter();
+    let mut until = instants.next().unwrap_or(time);
     while driver.time() < time {
-        driver.advance(system, time).inspect_err(|_| progress.clear())?;
+        if interrupt::asked() {
+            observer.record.interrupted = Some(driver.time());
+            break;
+        }
+        driver.advance(system, until).inspect_err(|_| progress.clear())?;
         if let Some(projection) = projection {
             driver.project(system, projection);
         }
@@ -328,9 +391,8 @@ fn go(
             observer.row(at(row), &q, &p);
             row += 1;
         }
-        if observer.record.balance.damped() {
-            let Observer { mechanism, record, .. } = &mut *observer;
-            record.balance.dissipate(mechanism, h, |theta| {
+        if observer.record.balance.changes() {
+            observer.work(start, h, |theta| {
                 driver.dense(system, theta, &mut q, &mut p);
                 (q.clone(), p.clone())
             });
@@ -342,6 +404,13 @@ fn go(
             row += 1;
         }
         system.output = false;
+        if end >= until && end < time {
+            until = instants.next().unwrap_or(time);
+            if let Some(control) = &settings.control {
+                control.enter(end);
+                driver.resume(system, end, &q, &p).inspect_err(|_| progress.clear())?;
+            }
+        }
         observer.record.spent.output += clock.elapsed().as_secs_f64();
         progress.show(end);
     }
@@ -391,27 +460,33 @@ fn failure(plan: &Plan, settings: &Settings, e: &StepError) -> Failure {
 }
 
 /// A progress line on a terminal for long runs.
-struct Progress {
+pub struct Progress {
     time: f64,
     next: Instant,
     shown: bool,
+    start: Instant,
 }
 
 impl Progress {
-    fn new(time: f64) -> Self {
-        Progress { time, next: Instant::now() + Duration::from_secs(1), shown: false }
+    /// A run of this length, s.
+    pub fn new(time: f64) -> Self {
+        let start = Instant::now();
+        Progress { time, next: start + Duration::from_secs(2), shown: false, start }
     }
 
-    fn show(&mut self, t: f64) {
+    /// The time that is reached, s.
+    pub fn show(&mut self, t: f64) {
         if Instant::now() < self.next || !std::io::stderr().is_terminal() {
             return;
         }
         self.next = Instant::now() + Duration::from_millis(250);
         self.shown = true;
-        let _ = write!(std::io::stderr(), "\rt = {t:.3} of {} s", self.time);
+        let left = self.start.elapsed().as_secs_f64() * (self.time / t - 1.0);
+        let _ = write!(std::io::stderr(), "\r\x1b[Kt = {t:.3} of {} s, about {left:.0} s left", self.time);
     }
 
-    fn clear(&mut self) {
+    /// Takes the line away.
+    pub fn clear(&mut self) {
         if std::mem::take(&mut self.shown) {
             let _ = write!(std::io::stderr(), "\r\x1b[K");
         }

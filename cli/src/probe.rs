@@ -31,17 +31,26 @@ pub struct Probe {
 
 /// Compares steps of `h` s with halved ones at states of the record.
 pub fn probe(plan: &Plan, settings: &Settings, record: &Record, h: f64) -> Outcome<Probe> {
-    let mut system = Timed::new(mechanism(plan, settings.interpreted)?);
+    let mut system = Timed::new(settings.driven(mechanism(plan, settings.interpreted)?));
     let components = components(plan);
     let range = range(&components, &record.q);
     let stride = record.q.len().div_ceil(PLACES);
     let mut found = Probe { error: 0.0, lost: false, places: 0 };
-    for (q, p) in record.q.iter().zip(&record.p).step_by(stride) {
+    let (instants, rows) = (settings.instants(), record.t.iter().zip(&record.q).zip(&record.p));
+    for ((&t, q), p) in rows.step_by(stride) {
+        // No step goes over a change of the control.
+        let next = instants.iter().find(|instant| **instant > t);
+        if next.is_none_or(|next| t + h > next * (1.0 + 1e-12)) {
+            continue;
+        }
+        if let Some(control) = &settings.control {
+            control.enter(t);
+        }
         found.places += 1;
         let mut end = |parts: f64| -> Option<(Vec<f64>, Vec<f64>)> {
             let met = Rc::new(RefCell::new(Drift::default()));
-            let mut driver = driver(plan, settings, &mut system, Step::Fixed(h / parts), (q, p), &met).ok()?;
-            driver.run(&mut system, h).ok()?;
+            let mut driver = driver(plan, settings, &mut system, Step::Fixed(h / parts), (t, q, p), &met).ok()?;
+            driver.run(&mut system, t + h).ok()?;
             let (mut q, mut p) = (q.clone(), p.clone());
             driver.state(&system, &mut q, &mut p);
             Some((q, p))

@@ -8,6 +8,7 @@ use multibody::codegen::model::{Coordinate, Unit, Value};
 use multibody::codegen::modes;
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
+use multibody::codegen::words;
 use multibody::runtime::catalogue;
 use multibody::runtime::constrained::{SingularPosition, Stabilisation};
 use multibody::runtime::contact::{RegimeChoice, RegimeRules};
@@ -15,12 +16,13 @@ use multibody::runtime::integrate::{Control, Statistics, Step, Tolerances};
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Interpreter, System};
 
-use super::args::{ContactRegime, MotionArgs, SimulateArgs};
+use super::args::{ContactRegime, MotionArgs, SimulateArgs, Trust};
+use super::control::{Controller, Table};
 use super::motion::{simulate, Drift, Record, Settings, Spent};
 use super::output::{note, writable, write_files};
 use super::plot::{self, Panel};
 use super::probe::Probe;
-use super::{contacts, energy, loops, picture, probe, source, trust, verdict, Failure, Outcome};
+use super::{columns, contacts, energy, interrupt, loops, picture, probe, source, trust, verdict, Failure, Outcome};
 
 /// Default method and tolerance. For the double pendulum, the spherical pendulum, the UR5 and the Panda, the error at
 /// the end was 4 to 160 times below that of `dop853` at this tolerance, for at most a sixth more evaluations.
@@ -83,6 +85,8 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     }
     let settings = Settings { every: every(args)?, project: args.project, ..settings(&args.motion)? };
     let (q, v, assembly) = start_closed(&plan, &args.motion)?;
+    let settings = controlled(&plan, args, settings, &q)?;
+    let columns = columns::chosen(&plan, &args.columns, settings.control.is_some())?;
     let csv = args.csv.clone().unwrap_or_else(|| PathBuf::from(format!("{}.csv", model.name)));
     let svg = args.svg.clone().unwrap_or_else(|| PathBuf::from(format!("{}.svg", model.name)));
     if csv == svg {
@@ -115,18 +119,20 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
         ));
     }
     if !model.contacts.is_empty() {
-        return with_contacts(args, &plan, (q, v), &settings, (&csv, &svg, &drawing), out);
+        return with_contacts(args, &plan, (q, v), &settings, (&csv, &svg, &drawing, &columns), out);
     }
+    interrupt::listen();
     let record = simulate(&plan, (q, v), &settings)?;
     let picture = plot::svg(&title(&plan, &settings), &panels(&plan, &record)).map_err(|e| {
         Failure::new(format!("cannot draw the plot: {e}"), "look at the numbers in the table; --csv names it")
     })?;
-    let table = table(&plan, &record);
+    let table = columns::table(&plan, &settings, &record, &columns)?;
     let mut files = vec![(csv.as_path(), table.as_str()), (svg.as_path(), picture.as_str())];
     let motion = args.picture.as_deref().map(|file| (file, picture::svg(&plan, &record, &[], &drawing)));
     files.extend(motion.as_ref().map(|(file, text)| (*file, text.as_str())));
     write_files(&files)?;
     writeln!(out, "{}", title(&plan, &settings))?;
+    about_control(args, &settings, &record, out)?;
     if let Some(assembly) = &assembly {
         writeln!(out, "loops: {}", assembly.summary())?;
     }
@@ -157,6 +163,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
         writeln!(out, "picture: {}", file.display())?;
     }
     let mut trusted = verdict::tell(path, &plan, &settings, &record, (energy, probe));
+    interrupted(&record)?;
     if let Some(how) = args.trust {
         trusted &= verdict::digits(path, trust::run(&plan, &settings, &record, how, out)?);
     }
@@ -167,13 +174,52 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     }
 }
 
+/// Settings with the control of the arguments, if there is any.
+fn controlled<'a>(plan: &Plan, args: &SimulateArgs, settings: Settings<'a>, q: &[f64]) -> Outcome<Settings<'a>> {
+    let control = Controller::new(plan, &args.motion.control, q, &columns::all(plan))?;
+    let Some(control) = control else { return Ok(settings) };
+    let refused = |what: &str, help: &str| Err(Failure::new(what, help));
+    if args.project {
+        return refused("--project keeps the energy, which the control changes", "leave --project out");
+    }
+    if args.trust == Some(Trust::Wide) {
+        return refused("--trust wide does not know the control", "take --trust without `wide`");
+    }
+    let explicit = catalogue::EXPLICIT.iter().any(|entry| entry.name == settings.method);
+    if !control.has_derivatives() && !explicit {
+        let names: Vec<&str> = catalogue::EXPLICIT.iter().map(|entry| entry.name).collect();
+        let what =
+            format!("--method {}: the derivatives of --gravity-compensation are not known to it", settings.method);
+        return refused(&what, &format!("take one of {}", names.join(", ")));
+    }
+    Ok(Settings { control: Some(control), ..settings })
+}
+
+/// What the control was, and what it asked of the joints.
+fn about_control(args: &SimulateArgs, settings: &Settings, record: &Record, out: &mut dyn Write) -> Outcome {
+    if let Some(control) = &settings.control {
+        writeln!(out, "control: {}", control.summary(&args.motion.control))?;
+    }
+    for line in record.loads.lines() {
+        writeln!(out, "{line}")?;
+    }
+    Ok(())
+}
+
+/// Ends a command whose run was interrupted, after its files were written.
+fn interrupted(record: &Record) -> Outcome {
+    let Some(time) = record.interrupted else { return Ok(()) };
+    note(format_args!("interrupted at {time:.6} s: the files hold the motion up to there"));
+    Err(Failure::Interrupted)
+}
+
 /// The run of a mechanism with contacts, and what is written and printed of it.
 fn with_contacts(
     args: &SimulateArgs,
     plan: &Plan,
     start: (Vec<f64>, Vec<f64>),
     settings: &Settings,
-    (csv, svg, drawing): (&Path, &Path, &picture::Drawing),
+    (csv, svg, drawing, columns): (&Path, &Path, &picture::Drawing, &columns::Columns),
     out: &mut dyn Write,
 ) -> Outcome {
     if args.trust.is_some() || args.project {
@@ -182,12 +228,14 @@ fn with_contacts(
             "leave them out; a second run with a smaller --tolerance shows the error",
         ));
     }
-    let touched = contacts::simulate(plan, start, settings, args.picture.is_some())?;
+    interrupt::listen();
+    let touched = contacts::simulate(plan, start, settings, args.picture.is_some() || columns.forces())?;
     let record = &touched.record;
     let plot = plot::svg(&title(plan, settings), &panels(plan, record)).map_err(|e| {
         Failure::new(format!("cannot draw the plot: {e}"), "look at the numbers in the table; --csv names it")
     })?;
-    let (table, events, beside) = (table(plan, record), contacts::table(plan, &touched.events), contacts::beside(csv));
+    let table = columns::table_with(plan, settings, record, columns, &touched.forces)?;
+    let (events, beside) = (contacts::table(plan, &touched.events), contacts::beside(csv));
     let mut files = vec![(csv, table.as_str()), (svg, plot.as_str()), (beside.as_path(), events.as_str())];
     let motion = args.picture.as_deref().map(|file| (file, picture::svg(plan, record, &touched.forces, drawing)));
     files.extend(motion.as_ref().map(|(file, text)| (*file, text.as_str())));
@@ -195,6 +243,7 @@ fn with_contacts(
     files.extend(modes.as_ref().map(|(file, text)| (*file, text.as_str())));
     write_files(&files)?;
     writeln!(out, "{}", title(plan, settings))?;
+    about_control(args, settings, record, out)?;
     contacts::report(plan, &touched, settings.regimes.choice, out)?;
     if settings.regimes.choice != RegimeChoice::TimeSteps {
         writeln!(out, "work: {}", work(&record.statistics))?;
@@ -215,7 +264,7 @@ fn with_contacts(
     if let Some(file) = &args.record_modes {
         writeln!(out, "modes: {} ({} sets)", file.display(), touched.visits.len())?;
     }
-    Ok(())
+    interrupted(record)
 }
 
 /// Time from one row to the next, s.
@@ -266,6 +315,7 @@ pub fn settings(args: &MotionArgs) -> Outcome<Settings<'_>> {
         hold: args.hold,
         interpreted: args.interpreted,
         regimes: regimes(args)?,
+        control: None,
     })
 }
 
@@ -297,9 +347,10 @@ fn regimes(args: &MotionArgs) -> Outcome<RegimeRules> {
 /// The title of the plot, which is also the first line of the report.
 pub fn title(plan: &Plan, settings: &Settings) -> String {
     let Settings { method, time, step, .. } = settings;
+    let kind = if settings.control.is_some() { "motion under control" } else { "free motion" };
     if settings.regimes.choice == RegimeChoice::TimeSteps {
         let h = settings.regimes.step;
-        return format!("{}: {time} s of free motion by time steps of {h} s (Moreau's midpoint rule)", plan.model.name);
+        return format!("{}: {time} s of {kind} by time steps of {h} s (Moreau's midpoint rule)", plan.model.name);
     }
     let title = catalogue::entry(method).map_or("", |e| e.title);
     let steps = match step {
@@ -309,7 +360,7 @@ pub fn title(plan: &Plan, settings: &Settings) -> String {
             format!("tolerance{partial} {:e}", t.rotations)
         }
     };
-    format!("{}: {time} s of free motion by {method} ({title}), {steps}", plan.model.name)
+    format!("{}: {time} s of {kind} by {method} ({title}), {steps}", plan.model.name)
 }
 
 /// Report of the work done.
@@ -401,6 +452,9 @@ fn start(plan: &Plan, args: &MotionArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
             format!("in order: {}", names.join(", ")),
         )),
     };
+    if let Some(file) = &args.start {
+        return end_of_run(plan, file);
+    }
     let names = plan.coordinate_names();
     let mut q = list("q", &args.q, names.clone(), default_start(plan))?;
     let speed = if plan.model.contacts.is_empty() { 0.1 } else { 0.0 };
@@ -426,6 +480,27 @@ fn start(plan: &Plan, args: &MotionArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
     Ok((q, v))
 }
 
+/// The state at the end of the table of another run.
+fn end_of_run(plan: &Plan, file: &Path) -> Outcome<(Vec<f64>, Vec<f64>)> {
+    let (coordinates, velocities) = (plan.coordinate_names(), plan.velocity_names());
+    let named = |letter: &str, names: &[String]| names.iter().map(|n| format!("{letter}.{n}")).collect::<Vec<_>>();
+    let names: Vec<String> = [named("q", &coordinates), named("v", &velocities)].concat();
+    let wanted: Vec<(String, usize)> = names.iter().cloned().zip(0..).collect();
+    let table = Table::read(file, &wanted, &columns::all(plan))?;
+    let mut state = vec![None; names.len()];
+    table.columns.iter().for_each(|(what, values)| state[*what] = values.last().copied());
+    let missing: Vec<&str> = state.iter().zip(&names).filter(|(x, _)| x.is_none()).map(|(_, n)| n.as_str()).collect();
+    if !missing.is_empty() {
+        return Err(Failure::new(
+            format!("--start: `{}` has no columns {}", file.display(), words::list(missing)),
+            "the table of a run has all coordinates and velocities of the model",
+        ));
+    }
+    let mut state: Vec<f64> = state.into_iter().flatten().collect();
+    let v = state.split_off(coordinates.len());
+    Ok((state, v))
+}
+
 /// The default start; `mbd simulate --help` states it.
 pub fn default_start(plan: &Plan) -> Vec<f64> {
     let interpreter: Interpreter<f64> = plan.default_interpreter();
@@ -445,39 +520,22 @@ pub fn default_start(plan: &Plan) -> Vec<f64> {
             [_] => q[at] = 0.05,
             _ => {}
         }
+        if let Some([lower, upper]) = plan.model.joints[slot.joint].bounds.range {
+            if !(lower..=upper).contains(&q[at]) {
+                q[at] = match lower.is_finite() && upper.is_finite() {
+                    true => 0.5 * (lower + upper),
+                    false => {
+                        if lower.is_finite() {
+                            lower
+                        } else {
+                            upper
+                        }
+                    }
+                };
+            }
+        }
     }
     q
-}
-
-/// The table: time, coordinates, velocities, momenta, energies.
-fn table(plan: &Plan, record: &Record) -> String {
-    let (coordinates, velocities) = (plan.coordinate_names(), plan.velocity_names());
-    let named = |letter: &str, names: &[String]| -> Vec<String> {
-        names.iter().map(|n| quoted(&format!("{letter}.{n}"))).collect()
-    };
-    let mut header = vec!["t".to_string()];
-    header.extend(named("q", &coordinates));
-    header.extend(named("v", &velocities));
-    header.extend(named("p", &velocities));
-    header.extend(["kinetic", "potential", "energy"].map(String::from));
-    let mut text = header.join(",") + "\n";
-    for (k, t) in record.t.iter().enumerate() {
-        let (kinetic, potential) = record.energy[k];
-        let _ = write!(text, "{t}");
-        for x in record.q[k].iter().chain(&record.v[k]).chain(&record.p[k]) {
-            let _ = write!(text, ",{x}");
-        }
-        let _ = writeln!(text, ",{kinetic},{potential},{}", kinetic + potential);
-    }
-    text
-}
-
-/// A field of a CSV file.
-pub fn quoted(name: &str) -> String {
-    match name.contains([',', '"', '\n', '\r']) {
-        true => format!("\"{}\"", name.replace('"', "\"\"")),
-        false => name.to_string(),
-    }
 }
 
 /// The plot: coordinates by unit, then the energy.
@@ -497,6 +555,15 @@ pub fn panels(plan: &Plan, record: &Record) -> Vec<Panel> {
             t: record.t.clone(),
             lines: chosen.into_iter().map(line).collect(),
         });
+    }
+    if !record.efforts.is_empty() {
+        let names = plan.velocity_names();
+        let moved = |k: &usize| record.efforts.iter().any(|tau| tau[*k] != 0.0);
+        let line = |k: usize| (names[k].clone(), record.efforts.iter().map(|tau| tau[k]).collect());
+        let lines: Vec<_> = (0..names.len()).filter(moved).map(line).collect();
+        if !lines.is_empty() {
+            panels.push(Panel { label: "effort [N m, N]".to_string(), t: record.t.clone(), lines });
+        }
     }
     let label = "relative energy change".to_string();
     panels.push(Panel { label, t: record.ends.t.clone(), lines: vec![(String::new(), record.ends.changes())] });

@@ -2,9 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use multibody::codegen::jit::Compiled;
 use multibody::runtime::system::{LieJoint, Row};
 use multibody::runtime::{Constrained, Differentiable, Energetic, StateDerivatives, System};
+
+use super::control::Driven;
 
 /// Total time of calls of one kind.
 #[derive(Clone, Copy, Debug, Default)]
@@ -23,9 +24,9 @@ impl Clocked {
     }
 }
 
-/// A compiled mechanism, with the times of its rates and their derivatives.
+/// A mechanism with its control, and the times of its rates and their derivatives.
 pub struct Timed {
-    inner: Compiled,
+    inner: Driven,
     /// Whether calls are for dense output rather than for steps.
     pub output: bool,
     /// Time of reading the clock once, s.
@@ -39,7 +40,7 @@ pub struct Timed {
 
 impl Timed {
     /// Wraps a mechanism.
-    pub fn new(inner: Compiled) -> Self {
+    pub fn new(inner: Driven) -> Self {
         let readings = (0..100).map(|_| Instant::now().elapsed());
         let clock = readings.min().unwrap_or(Duration::ZERO).as_secs_f64();
         Timed {

@@ -163,6 +163,7 @@ fn settings() -> Settings<'static> {
         hold: Stabilisation::default(),
         interpreted: true,
         regimes: RegimeRules::default(),
+        control: None,
     }
 }
 

@@ -1,5 +1,6 @@
 //! Arguments of all commands, and their help.
 
+mod control;
 mod generate;
 mod values;
 
@@ -11,6 +12,7 @@ use multibody::codegen::read::{Base, Floor, ImportOptions};
 use multibody::runtime::constrained::Stabilisation;
 use values::{choice, finite, methods, one_of, positive, snap, vector};
 
+pub use control::{ControlArgs, Gain, Interpolation};
 pub use generate::{CodeArgs, GenerateArgs, Language, DEFAULT_RUNTIME};
 pub use values::{type_name, HOLD};
 
@@ -330,8 +332,11 @@ pub struct CertifyArgs {
 /// `mbd simulate`.
 #[derive(Args)]
 #[command(
-    after_help = "The motion is free: joint forces and wrenches are zero, prescribed joints are at rest, dampers and springs of the
-model act.
+    after_help = "Without one of the options under Control, the motion is free: joint forces and wrenches are zero. Prescribed joints are
+at rest, dampers and springs of the model act. docs/control.md describes motion under control: its efforts are limited to what the
+joints are made for, and the report tells where positions and speeds leave their bounds.
+
+An interrupt (Ctrl-C) ends the run early: the table and the plot then hold what was computed, and the exit status is 130.
 
 Steps are chosen by their error (--tolerance) with Verner's method of order 9, unless --method says otherwise; with --step
 they are fixed, by the classical Runge-Kutta method of order 4 unless --method says otherwise. Rows of the table lie at
@@ -339,8 +344,9 @@ equal times, between the steps by dense output.
 
 The start, unless --q and --v say otherwise: angles 0.3 and -0.3 rad in turn, displacements 0.05 m, planar, spherical and
 floating joints neutral; every velocity 0.1 (rad/s or m/s). A model with `start`s, loops or couplings starts from its `start`s,
-neutral where it states none; loops are closed from there (from --q, if given) without moving `held` joints. Velocities then
-follow from those of the `held` joints; where none is held, they are the nearest ones that satisfy the constraints.
+neutral where it states none. A position outside the range of its joint is moved to the middle of it. Loops are closed from
+there (from --q, if given) without moving `held` joints. Velocities then follow from those of the `held` joints; where none is
+held, they are the nearest ones that satisfy the constraints.
 
 Without dampers the energy is constant; with dampers it changes by their work. What it changes by otherwise is an error of the
 simulation. It is printed relative to the largest kinetic energy, as a multiple of the tolerance, and beside what errors of the
@@ -373,6 +379,11 @@ pub struct SimulateArgs {
     /// Time from one row of the table to the next, s
     #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "rows")]
     pub every: Option<f64>,
+    /// Columns of the table: `q`, `v`, `p`, `energy`, `tau` (joint forces of the control), `frames` (positions of all bodies and
+    /// frames, m), `multipliers`, `forces` (of contacts), or names of single columns; separated by commas
+    /// [default: q,v,p,energy, and tau under control]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub columns: Vec<String>,
     /// File to write with the sets of modes of the contacts that the motion visits, for `mbd generate --modes`
     #[arg(long, value_name = "FILE")]
     pub record_modes: Option<PathBuf>,
@@ -422,6 +433,10 @@ pub struct MotionArgs {
     /// Initial velocities, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
     pub v: Option<Vec<f64>>,
+    /// Table of another run, CSV: the motion starts where that one ended, with the coordinates `q.NAME` and velocities
+    /// `v.NAME` of its last line
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["q", "v"])]
+    pub start: Option<PathBuf>,
     /// Leave out the dampers of the model
     #[arg(long)]
     pub no_damping: bool,
@@ -437,6 +452,8 @@ pub struct MotionArgs {
     /// How loops are kept closed
     #[arg(long, value_parser = one_of(HOLD), default_value = "mass")]
     pub hold: Stabilisation,
+    #[command(flatten)]
+    pub control: ControlArgs,
 }
 
 /// `mbd modes`.

@@ -4,6 +4,7 @@
 mod report;
 mod tangent;
 
+use std::fmt::Display;
 use std::io::Write;
 
 use multibody::codegen::plan::Plan;
@@ -43,9 +44,13 @@ pub fn run(plan: &Plan, settings: &Settings, record: &Record, how: Trust, out: &
         Trust::Tenth => again(plan, settings, record)?,
         Trust::Wide => wide(plan, settings, record)?,
     };
-    let growth = tangent::growth(plan, settings, record);
+    let growth = match settings.control {
+        None => tangent::growth(plan, settings, record).map_err(|e| e.to_string()),
+        Some(_) => Err("the tangent flow does not know the control".to_string()),
+    };
     let findings = Findings::new(plan, record, &errors, growth.as_ref().ok());
-    findings.write(plan, record, &errors, growth.as_ref(), out)?;
+    let shown = growth.as_ref().map_err(|e| e as &dyn Display);
+    findings.write(plan, record, &errors, shown, out)?;
     Ok(findings.some_left())
 }
 
@@ -59,7 +64,7 @@ fn again(plan: &Plan, settings: &Settings, record: &Record) -> Outcome<Errors> {
         }
     };
     let start = (record.q[0].clone(), record.v[0].clone());
-    let better = simulate(plan, start, &Settings { step, ..*settings }).map_err(|e| match e {
+    let better = simulate(plan, start, &Settings { step, ..settings.clone() }).map_err(|e| match e {
         Failure::Message(what, help) => Failure::new(format!("--trust, at {with}: {what}"), help),
         other => other,
     })?;

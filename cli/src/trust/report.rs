@@ -1,9 +1,9 @@
 //! What is left of the digits of a run, in words.
 
+use std::fmt::Display;
 use std::io::Write;
 
 use multibody::codegen::plan::Plan;
-use multibody::runtime::integrate::StepError;
 
 use super::tangent::Growth;
 use super::{Errors, Record};
@@ -71,7 +71,7 @@ impl Findings {
         plan: &Plan,
         record: &Record,
         errors: &Errors,
-        growth: Result<&Growth, &StepError>,
+        growth: Result<&Growth, &dyn Display>,
         out: &mut dyn Write,
     ) -> Outcome {
         let time = record.t.last().copied().unwrap_or(0.0);

@@ -139,7 +139,7 @@ pub fn agrees_with_pages(command: &[&str], printed: &str) -> usize {
 #[test]
 fn commands_in_code_blocks_run_and_print_what_is_shown() {
     let folder = folder("documented");
-    for name in ["models", "codegen"] {
+    for name in ["models", "codegen", "examples"] {
         std::os::unix::fs::symlink(Path::new(ROOT).join(name), folder.join(name)).expect("a link");
     }
     std::fs::create_dir_all(folder.join(PICTURES)).expect("a directory");

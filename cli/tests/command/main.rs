@@ -4,6 +4,7 @@ mod c;
 mod certify;
 mod commands;
 mod contacts;
+mod control;
 mod documented;
 mod eval;
 mod loops;

@@ -35,6 +35,13 @@ pub fn run_in(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(PROGRAM).current_dir(folder).args(arguments).output().expect("the program runs")
 }
 
+/// Starts the executable in a folder, silently.
+pub fn start_in(folder: &Path, arguments: &[&str]) -> std::process::Child {
+    let silent = std::process::Stdio::null;
+    let mut command = Command::new(PROGRAM);
+    command.current_dir(folder).args(arguments).stdout(silent()).stderr(silent()).spawn().expect("the program runs")
+}
+
 /// Runs the executable in the root of the repository.
 pub fn run(arguments: &[&str]) -> Output {
     run_in(Path::new(ROOT), arguments)

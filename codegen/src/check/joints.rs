@@ -2,10 +2,10 @@
 
 use super::names::Names;
 use super::numbers::{Numbers, Quantity};
-use crate::import::raw::{RawFreedoms, RawJoint, RawModel, RawMotion};
+use crate::import::raw::{RawFreedoms, RawJoint, RawModel, RawMotion, RawNumber, RawValue};
 use crate::import::source::{Findings, Span};
 use crate::import::words::{list, quote};
-use crate::model::{Joint, JointKind, JointMotion, JointSpec, Value, JOINTS};
+use crate::model::{Joint, JointBounds, JointKind, JointMotion, JointSpec, Value, JOINTS};
 use crate::rounded_once::norm;
 
 /// What each coordinate measures.
@@ -42,8 +42,47 @@ pub(super) fn joint(raw: &RawJoint, numbers: &mut Numbers) -> Joint {
     joint.stiffness = freedoms(&raw.stiffness, &plain, "stiffness", kind, &what, numbers);
     joint.rest = freedoms(&raw.rest, &rest, "rest", kind, &what, numbers);
     joint.armature = freedoms(&raw.armature, &plain, "armature", kind, &what, numbers);
+    joint.bounds = bounds(raw, &what, numbers.findings);
     signs(raw, &joint, &what, numbers);
     joint
+}
+
+/// What a joint is made for: constants.
+fn bounds(raw: &RawJoint, what: &str, findings: &mut Findings) -> JointBounds {
+    let mut constant = |number: &RawNumber, key: &str| match number.value {
+        RawValue::Const(x) => Some(x),
+        RawValue::Invalid => None,
+        _ => {
+            findings.error(number.span, format!("{what}: `{key}` cannot be a parameter"), "write a number");
+            None
+        }
+    };
+    let range = raw.range.as_ref().map(|range| {
+        let mut end = |x: &Option<RawNumber>, open: f64| match x {
+            None => Some(open),
+            Some(x) => constant(x, "range"),
+        };
+        (range.span, end(&range.lower, f64::NEG_INFINITY), end(&range.upper, f64::INFINITY))
+    });
+    let mut largest = |number: &Option<RawNumber>, key| {
+        number.as_ref().and_then(|number| constant(number, key).map(|x| (number.span, key, x)))
+    };
+    let (velocity, effort) = (largest(&raw.max_velocity, "max_velocity"), largest(&raw.max_effort, "max_effort"));
+    for (span, key, x) in [velocity, effort].into_iter().flatten() {
+        if x <= 0.0 {
+            let help = "leave it out for a joint without a limit";
+            findings.error(span, format!("{what}: `{key}` is {x} and must be positive"), help);
+        }
+    }
+    let range = range.and_then(|(span, lower, upper)| {
+        let (lower, upper) = (lower?, upper?);
+        if lower >= upper {
+            let help = "write the lower end first: `[lower, upper]`";
+            findings.error(span, format!("{what}: `range` from {lower} to {upper} is empty"), help);
+        }
+        Some([lower, upper])
+    });
+    JointBounds { range, velocity: velocity.map(|v| v.2), effort: effort.map(|e| e.2) }
 }
 
 fn joint_kind(raw: &RawJoint, kind: &JointSpec, what: &str, numbers: &mut Numbers) -> JointKind {
@@ -94,6 +133,9 @@ fn superfluous(raw: &RawJoint, kind: &JointSpec, what: &str, findings: &mut Find
         ("stiffness", at(&raw.stiffness), has_spring),
         ("rest", at(&raw.rest), has_spring),
         ("armature", at(&raw.armature), moves),
+        ("range", raw.range.as_ref().map(|range| range.span), kind.nv() == 1),
+        ("max_velocity", raw.max_velocity.as_ref().map(|x| x.span), moves),
+        ("max_effort", raw.max_effort.as_ref().map(|x| x.span), moves),
     ];
     for (key, span, allowed) in entries {
         if let (Some(span), false) = (span, allowed) {

@@ -147,6 +147,12 @@ pub struct RawJoint {
     pub limits: Option<RawLimits>,
     /// Coefficient of restitution of the stops; 0 where `None`.
     pub limit_restitution: Option<RawNumber>,
+    /// Coordinates that the joint is made for, without stops.
+    pub range: Option<RawLimits>,
+    /// Largest speed, rad/s or m/s.
+    pub max_velocity: Option<RawNumber>,
+    /// Largest effort, N m or N.
+    pub max_effort: Option<RawNumber>,
 }
 
 /// Stops of a joint.
@@ -188,6 +194,9 @@ impl RawJoint {
             held: None,
             limits: None,
             limit_restitution: None,
+            range: None,
+            max_velocity: None,
+            max_effort: None,
         }
     }
 }

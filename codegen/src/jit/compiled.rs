@@ -249,6 +249,16 @@ impl<S: Number> Compiled<S> {
         }
     }
 
+    /// Bias forces, `(q, v) → h` with `M v̇ + h = τ`.
+    ///
+    /// # Panics
+    /// As [`Compiled::velocities`].
+    pub fn bias(&mut self, q: &[S], v: &[S], h: &mut [S]) {
+        if !self.run(Output::Bias, [q, v, &[]], &mut [h]) {
+            self.interpreter.bias(q, v, h);
+        }
+    }
+
     /// Kinetic and potential energy, `(q, p) → (kinetic, potential)`, J.
     ///
     /// # Panics

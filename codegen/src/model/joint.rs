@@ -412,8 +412,22 @@ pub struct Joint {
     pub rest: Vec<Value>,
     /// Reflected rotor inertia for each degree of freedom, kg m² or kg.
     pub armature: Vec<Value>,
+    /// What it is made for.
+    pub bounds: JointBounds,
     /// Place of its description.
     pub origin: Origin,
+}
+
+/// What a joint is made for. It changes no equation: motion under control respects or reports it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct JointBounds {
+    /// Least and greatest coordinate of a joint of one freedom, rad or m.
+    pub range: Option<[f64; 2]>,
+    /// Largest speed of each freedom, rad/s or m/s.
+    pub velocity: Option<f64>,
+    /// Largest effort of each freedom, N m or N.
+    pub effort: Option<f64>,
 }
 
 impl Joint {
@@ -438,6 +452,7 @@ impl Joint {
             stiffness: zero(),
             rest: zero(),
             armature: zero(),
+            bounds: JointBounds::default(),
             origin: Origin::default(),
         }
     }

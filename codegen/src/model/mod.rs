@@ -13,7 +13,7 @@ pub use constraint::{
     Constraint, ConstraintKind, Direction, LoopKind, LoopNumbers, LoopSpec, Mount, NumberKey, Stands, LOOPS,
 };
 pub use contact::{Contact, Shape, ShapeKind, ShapeSpec, SHAPES};
-pub use joint::{Coordinate, Freedom, Joint, JointKind, JointMotion, JointSpec, JOINTS};
+pub use joint::{Coordinate, Freedom, Joint, JointBounds, JointKind, JointMotion, JointSpec, JOINTS};
 pub(crate) use joint::{FIXED, FLOATING, PLANAR, REVOLUTE};
 
 /// Place of a part of the description in its file. It is ignored in comparisons: two models are equal if they describe

@@ -214,6 +214,17 @@ impl Plan {
         self.state_names(|spec| spec.freedoms.iter().map(|f| f.name).collect())
     }
 
+    /// Largest effort of every velocity that the description allows, N m or N; infinite where it states none.
+    pub fn effort_limits(&self) -> Vec<f64> {
+        let mut limits = vec![f64::INFINITY; self.dims.nv];
+        for slot in &self.slots {
+            if let (Some(Source::State { v, .. }), joint) = (slot.at, &self.model.joints[slot.joint]) {
+                limits[v..v + joint.kind.nv()].fill(joint.bounds.effort.unwrap_or(f64::INFINITY));
+            }
+        }
+        limits
+    }
+
     /// Names of the dynamic parameters, the columns of the regressor: `forearm.m`, `forearm.mx` (first moment),
     /// `forearm.ixx` (inertia at the frame of the body) and so on, `elbow.damping`, `elbow.friction`.
     pub fn parameter_names(&self) -> Vec<String> {

@@ -244,6 +244,25 @@ where
         Ok(())
     }
 
+    /// Goes on from the state here after a change of inputs, such as joint forces that jump.
+    ///
+    /// # Errors
+    /// As [`ContactMotion::run`]. A motion that may choose goes on by time steps where contacts cannot be resolved.
+    pub fn resume(&mut self, system: &mut WithContacts<Y>) -> Result<(), HybridError> {
+        if self.regime == Regime::TimeSteps {
+            return Ok(());
+        }
+        match self.events.resume(system) {
+            Err(_) if self.rules.choice == RegimeChoice::Automatic => {
+                self.t = self.events.time();
+                self.events.state(system, &mut self.q, &mut self.p);
+                self.begin_steps(system);
+                Ok(())
+            }
+            other => other,
+        }
+    }
+
     /// Takes one step of the regime, not beyond `t_end` (s), and changes the regime if it is time.
     ///
     /// # Errors

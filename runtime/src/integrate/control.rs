@@ -19,7 +19,8 @@ pub struct Tolerances {
     pub coordinates: Tolerance,
     /// Rotations by quaternions: tangent vector, rad.
     pub rotations: f64,
-    /// Momenta. The size of a momentum counts as at least a thousandth of the largest one.
+    /// Momenta. The size of a momentum counts as at least a thousandth of the largest one since the motion began: where it
+    /// comes to rest, nothing but rounding errors is left of it.
     pub momenta: Tolerance,
     /// The errors by which the step is chosen.
     pub control: Control,

@@ -35,6 +35,8 @@ pub struct Solver<Y: System, M> {
     /// Next step, s; zero if it has not been chosen.
     next: f64,
     last_error: f64,
+    /// Largest momentum so far.
+    largest: f64,
     rejections: u64,
     /// Steps that were cut by an event or a restart before the method accepted them.
     cut: u64,
@@ -88,6 +90,7 @@ where
             pending: None,
             next: 0.0,
             last_error: 1e-4,
+            largest: 0.0,
             rejections: 0,
             cut: 0,
             looked: (system.neutral(), system.zero_momenta()),
@@ -100,11 +103,27 @@ where
         Ok(solver)
     }
 
-    /// Starts again from another state: after an event, an impact, or a change of inputs.
+    /// Starts again from another state, as a new solver would.
     ///
     /// # Errors
     /// [`StepError::Quaternion`].
     pub fn restart(
+        &mut self,
+        system: &mut Y,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+    ) -> Result<(), StepError> {
+        self.largest = 0.0;
+        self.resume(system, t, q, p)
+    }
+
+    /// Goes on with the same motion from another state: after an event, an impact, or a change of inputs. In contrast to
+    /// [`Solver::restart`], the largest momentum so far stays the measure of small ones.
+    ///
+    /// # Errors
+    /// [`StepError::Quaternion`].
+    pub fn resume(
         &mut self,
         system: &mut Y,
         t: Y::Scalar,
@@ -353,6 +372,7 @@ where
         field.chart().size(system, &mut self.size);
         let rate = self.method.start_rate(system, self.t);
         let h = Y::Scalar::constant(h);
+        self.largest = self.size.p.as_ref().iter().fold(self.largest, |m, p| m.max(p.to_f64().abs()));
         for (size, rate) in self.size.parts_mut().into_iter().zip(rate.parts()) {
             for (size, rate) in size.iter_mut().zip(rate) {
                 *size = *size + (h * *rate).abs();
@@ -363,7 +383,7 @@ where
         let (share, rounding) = (self.method.share(), ROUNDING * Y::Scalar::epsilon());
         let part = |allowed: f64, most: f64| Y::Scalar::constant((share * allowed).max(allowed.min(rounding * most)));
         let largest = |part: &[Y::Scalar]| part.iter().fold(0.0_f64, |m, x| m.max(x.to_f64()));
-        let (most_x, most_p) = (largest(self.size.x.as_ref()), largest(self.size.p.as_ref()));
+        let (most_x, most_p) = (largest(self.size.x.as_ref()), largest(self.size.p.as_ref()).max(self.largest));
         let allowed = |t: Tolerance, size: f64, most: f64| part(t.absolute + t.relative * size, most);
         for (scale, size) in self.scale.x.as_mut().iter_mut().zip(self.size.x.as_ref()) {
             *scale = allowed(tolerances.coordinates, size.to_f64(), most_x);

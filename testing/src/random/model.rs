@@ -1,6 +1,6 @@
 //! Random mechanisms: bodies, joints and inputs together.
 
-use mbd_codegen::model::{Frame, Gravity, Joint, JointMotion, Model, Origin, Value, Wrench, WrenchAxes};
+use mbd_codegen::model::{Frame, Gravity, Joint, JointBounds, JointMotion, Model, Origin, Value, Wrench, WrenchAxes};
 
 use super::bodies::{weights, Weight};
 use super::builder::{Builder, Skeleton};
@@ -60,6 +60,7 @@ impl Builder<'_> {
             rest: self.per_freedom(n, if has_spring { 0.7 } else { 0.0 }, -0.5, 0.5),
             stiffness,
             armature: self.per_freedom(n, k.armature, 0.01, 0.2),
+            bounds: JointBounds::default(),
             origin: Origin::default(),
         }
     }

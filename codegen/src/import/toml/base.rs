@@ -129,4 +129,7 @@ pub(super) fn change_joint(old: &mut RawJoint, new: RawJoint) {
     replace(&mut old.held, new.held);
     replace(&mut old.limits, new.limits);
     replace(&mut old.limit_restitution, new.limit_restitution);
+    replace(&mut old.range, new.range);
+    replace(&mut old.max_velocity, new.max_velocity);
+    replace(&mut old.max_effort, new.max_effort);
 }

@@ -36,6 +36,9 @@ pub(super) const JOINT: &[&str] = &[
     "held",
     "limits",
     "limit_restitution",
+    "range",
+    "max_velocity",
+    "max_effort",
 ];
 pub(super) const FRAME: &[&str] = &["name", "body", "xyz", "rpy", "rotate"];
 pub(super) const WRENCH: &[&str] = &["name", "body", "frame"];
@@ -185,7 +188,10 @@ pub(super) fn joint(table: Table, known: &mut Known, raw: &mut RawModel, finding
         start,
         start_velocity,
         held: table.flag("held", findings),
-        limits: limits(&table, units[0], findings),
+        limits: limits(&table, "limits", units[0], findings),
+        range: limits(&table, "range", units[0], findings),
+        max_velocity: table.number("max_velocity", Unit::Plain, findings),
+        max_effort: table.number("max_effort", Unit::Plain, findings),
         limit_restitution: table.number("limit_restitution", Unit::Plain, findings),
         ..RawJoint::new(name.clone().unwrap_or(Spanned::new(String::new(), table.span)), kind, child)
     };
@@ -207,13 +213,13 @@ fn unbounded(table: &Table, kind: Option<&JointSpec>, findings: &mut Findings) -
 }
 
 /// `[lower, upper]`, or a table of one or both.
-fn limits(table: &Table, unit: Unit, findings: &mut Findings) -> Option<RawLimits> {
-    let value = table.raw("limits")?;
-    let (span, what): (Span, _) = (value.span().into(), format!("{}`limits`", table.prefix()));
+fn limits(table: &Table, key: &str, unit: Unit, findings: &mut Findings) -> Option<RawLimits> {
+    let value = table.raw(key)?;
+    let (span, what): (Span, _) = (value.span().into(), format!("{}`{key}`", table.prefix()));
     if let DeValue::Table(t) = value.get_ref() {
         if !t.contains_key("deg") && !t.contains_key("param") {
             let inner = Table::new(t, span, what.clone());
-            inner.reject_unknown(&["lower", "upper"], "the limits of a joint", findings);
+            inner.reject_unknown(&["lower", "upper"], &format!("the {key} of a joint"), findings);
             if t.is_empty() {
                 findings.error(span, format!("{what} is an empty table"), "write `[lower, upper]`, or one of them");
             }

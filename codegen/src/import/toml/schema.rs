@@ -132,12 +132,14 @@ fn property(table: &str, key: &str) -> String {
         (_, "rotate") => reference("rotation"),
         (_, "axis" | "axis2" | "normal") => reference("direction"),
         (_, "inertia" | "mimic" | "limits") => reference(key),
+        (_, "range") => reference("limits"),
         (_, "damping" | "stiffness" | "rest" | "armature" | "start" | "start_velocity") => reference("freedoms"),
         (_, "ratios" | "radii" | "lengths" | "row") => reference("numbers"),
         (_, "offset") => reference("angle"),
         (_, "mass" | "pitch" | "length" | "radius" | "decay" | "friction" | "restitution" | "limit_restitution") => {
             reference("number")
         }
+        (_, "max_velocity" | "max_effort") => reference("number"),
         // A test sees to it that there is none.
         _ => "{}".into(),
     }

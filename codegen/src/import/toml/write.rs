@@ -222,6 +222,9 @@ impl Text {
         self.maybe("held", joint.held.as_ref().map(|held| held.value));
         self.maybe("limits", joint.limits.as_ref().map(limits));
         self.maybe("limit_restitution", joint.limit_restitution.as_ref().map(number));
+        self.maybe("range", joint.range.as_ref().map(limits));
+        self.maybe("max_velocity", joint.max_velocity.as_ref().map(number));
+        self.maybe("max_effort", joint.max_effort.as_ref().map(number));
     }
 
     fn frame(&mut self, frame: &RawFrame) {

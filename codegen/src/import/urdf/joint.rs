@@ -15,7 +15,7 @@ const IGNORED: [(&str, &str); 2] =
 
 /// What is said of limits that are not asked for.
 const UNUSED_LIMIT: &str =
-    "`limit` is not used: joints move without stops (`--limits` of `mbd simulate` reads them), torques without bounds";
+    "`limit` makes no stops (`--limits` of `mbd simulate` asks for them); it bounds motion under control";
 
 /// Reads a `joint`, with its `limits` as stops where they are asked for. Without a name, a parent or a child it is reported and left out.
 pub(super) fn read(reader: &mut Reader, node: Node, limits: bool) -> Option<RawJoint> {
@@ -43,6 +43,9 @@ pub(super) fn read(reader: &mut Reader, node: Node, limits: bool) -> Option<RawJ
     // The leader's stops are those of both.
     joint.limits = limits.filter(|_| !unbounded && mimic.is_none());
     joint.mimic = mimic;
+    if let Some(limit) = limit {
+        bounds(&mut joint, limit);
+    }
     Some(joint)
 }
 
@@ -145,7 +148,6 @@ fn read_limit(
         reader.tally.notice(place(node), UNUSED_LIMIT);
         return None;
     }
-    reader.tally.notice(place(node), "torques and speeds have no bounds: of `limit`, `lower` and `upper` are used");
     reader.leaf(node, &["lower", "upper", "effort", "velocity"]);
     let (lower, upper) = (reader.number(node, "lower", whose), reader.number(node, "upper", whose));
     // A joint of several freedoms or none has no stops, and one without these numbers is not meant to have any.
@@ -164,6 +166,27 @@ fn read_limit(
         }
     }
     Some(RawLimits { span, lower: Some(lower), upper: Some(upper) })
+}
+
+/// What a joint is made for. Files are careless about it: zeros and what is no number say nothing.
+fn bounds(joint: &mut RawJoint, node: Node) {
+    /// Numbers beyond this are meant as none.
+    const LARGEST: f64 = 1e30;
+    let number = |key: &str| {
+        let x = node.attribute(key)?.trim().parse::<f64>().ok()?;
+        (x.abs() < LARGEST).then(|| Spanned::new(RawValue::Const(x), place(node)))
+    };
+    let positive = |key: &str| number(key).filter(|x| matches!(x.value, RawValue::Const(x) if x > 0.0));
+    let Some(spec) = joint.kind.as_ref().map(|k| k.value).filter(|spec| spec.nv() > 0) else { return };
+    (joint.max_velocity, joint.max_effort) = (positive("velocity"), positive("effort"));
+    let single = spec.nv() == 1 && !joint.unbounded && joint.mimic.is_none();
+    if let (true, Some(lower), Some(upper)) = (single, number("lower"), number("upper")) {
+        let range = node.range();
+        if matches!((&lower.value, &upper.value), (RawValue::Const(a), RawValue::Const(b)) if a < b) {
+            let span = Span::new(range.start, range.end);
+            joint.range = Some(RawLimits { span, lower: Some(lower), upper: Some(upper) });
+        }
+    }
 }
 
 fn is_not_zero(number: &RawNumber) -> bool {

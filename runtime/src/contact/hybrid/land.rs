@@ -54,7 +54,7 @@ where
     /// Takes a true step from the start of the last one to the time of an event.
     fn step_to(&mut self, system: &mut WithContacts<Y>, time: Y::Scalar) -> Result<(), HybridError> {
         let Hybrid { solver, start, q, p, .. } = self;
-        solver.restart(system, start.0, &start.1, &start.2)?;
+        solver.resume(system, start.0, &start.1, &start.2)?;
         let first = core::mem::replace(&mut solver.limits.first_step, (time - start.0).to_f64());
         let done = solver.run(system, time);
         solver.limits.first_step = first;

@@ -351,6 +351,18 @@ where
         self.settle_modes(system, t, None)
     }
 
+    /// Goes on from the state here after a change of inputs, such as joint forces that jump: which contacts stay closed and
+    /// stick is found again.
+    ///
+    /// # Errors
+    /// [`HybridError`].
+    pub fn resume(&mut self, system: &mut WithContacts<Y>) -> Result<(), HybridError> {
+        let t = self.solver.time();
+        self.solver.state(system, &mut self.q, &mut self.p);
+        system.look(t, &self.q, &self.p);
+        self.settle_modes(system, t, None)
+    }
+
     /// Takes a state, with all contacts open.
     ///
     /// # Errors
@@ -477,7 +489,7 @@ where
         self.immobile = system.at_rest();
         if self.immobile {
             let Hybrid { solver, start, .. } = self;
-            solver.restart(system, t, &start.1, &start.2)?;
+            solver.resume(system, t, &start.1, &start.2)?;
             solver.limits.first_step = 2.0 * h.to_f64();
         }
         Ok(())

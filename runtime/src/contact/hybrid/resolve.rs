@@ -88,7 +88,7 @@ where
         // Slip that begins has the direction of its acceleration while it is slow: the first step ends before it is not.
         let creeps = CREEP / self.slipping.to_f64();
         self.solver.limits.first_step = if creeps < LONGEST { creeps } else { 0.0 };
-        self.solver.restart(system, t, &self.q, &self.p)?;
+        self.solver.resume(system, t, &self.q, &self.p)?;
         Ok(())
     }
 

@@ -195,7 +195,7 @@ where
         while pieces < PIECES {
             pieces *= 2;
             let Tangent { system, motion, near: (q, p), .. } = self;
-            motion.solver.restart(system, start, q, p)?;
+            motion.solver.resume(system, start, q, p)?;
             motion.solver.limits.max_step = longest.min((t - start.re).to_f64() / f64::from(pieces));
             let done = self.run_to(t);
             self.motion.solver.limits.max_step = longest;
@@ -336,7 +336,7 @@ where
         self.shift(-dt);
         self.project(t);
         let Tangent { system, motion, near: (q, p), .. } = self;
-        motion.solver.restart(system, t, q, p)?;
+        motion.solver.resume(system, t, q, p)?;
         Ok(())
     }
 
