@@ -12,10 +12,16 @@ mod clutch;
 mod docking;
 #[path = "../examples/gripper.rs"]
 mod gripper;
+#[path = "../examples/identification.rs"]
+mod identification;
+#[path = "../examples/kalman.rs"]
+mod kalman;
 #[path = "../examples/known_at_run_time.rs"]
 mod known_at_run_time;
 #[path = "../examples/lqr.rs"]
 mod lqr;
+#[path = "../examples/mpc/main.rs"]
+mod mpc;
 #[path = "../examples/pendulum.rs"]
 mod pendulum;
 
@@ -64,4 +70,19 @@ fn an_arm_takes_a_box_and_throws_it() -> Outcome {
 #[test]
 fn a_robot_is_compiled_at_run_time() -> Outcome {
     known_at_run_time::main()
+}
+
+#[test]
+fn a_robot_is_identified() -> Outcome {
+    identification::main()
+}
+
+#[test]
+fn a_pendulum_is_followed_by_a_filter() -> Outcome {
+    kalman::main()
+}
+
+#[test]
+fn an_acrobot_swings_up_and_an_arm_reaches() -> Outcome {
+    mpc::main()
 }

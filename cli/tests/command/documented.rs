@@ -147,7 +147,8 @@ fn commands_in_code_blocks_run_and_print_what_is_shown() {
     for shown in shown().iter().filter(|s| s.in_block) {
         let Some(arguments) = shown.arguments().filter(|a| shown.can_run(a)) else { continue };
         let output = run_in(&folder, &arguments);
-        let refused = shown.prints.as_ref().is_some_and(|text| text.contains("error: "));
+        let is_error = |line: &str| line.starts_with("error: ") || line.contains(": error: ");
+        let refused = shown.prints.as_ref().is_some_and(|text| text.lines().any(is_error));
         let status = i32::from(refused);
         assert_eq!(output.status.code(), Some(status), "{}: {}\n{}", shown.place, shown.text, err(&output));
         if let Some(text) = &shown.prints {
