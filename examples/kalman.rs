@@ -10,6 +10,7 @@
 #[path = "mpc/steps.rs"]
 mod steps;
 
+use multibody::runtime::{Differentiable, Real, StateDerivatives};
 use nalgebra::{SMatrix, SVector};
 use steps::{Dynamics, Steps};
 

@@ -5,9 +5,8 @@
 //! with diagonal weights. Nothing is allocated, and no function beyond the four operations is called, so that the bits are
 //! the same on every machine.
 
-use multibody::runtime::{Real, Scalar};
-
 use super::steps::Dynamics;
+use super::{Real, Scalar};
 
 /// Weights, goal and bounds.
 #[derive(Clone, Debug)]
@@ -55,9 +54,9 @@ fn clamp<S: Real>(x: S, low: S, high: S) -> S {
 
 /// How an iteration ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Progress {
+pub enum Progress<S> {
     /// The cost fell by this part of itself.
-    Improved(f64),
+    Improved(S),
     /// No direction reduces the cost by more than rounding.
     Converged,
     /// No step along the direction reduces the cost; the next iteration is more cautious.
@@ -135,7 +134,7 @@ impl<S: Real, const NX: usize, const NU: usize, const N: usize> Ilqr<S, NX, NU, 
     }
 
     /// One iteration: the policy from the end to the start, then a step along it that reduces the cost.
-    pub fn iterate(&mut self, dynamics: &mut impl Dynamics<S, NX, NU>, problem: &Problem<S, NX, NU>) -> Progress {
+    pub fn iterate(&mut self, dynamics: &mut impl Dynamics<S, NX, NU>, problem: &Problem<S, NX, NU>) -> Progress<S> {
         let Some([linear, quadratic]) = self.backward(dynamics, problem) else {
             self.cautious();
             return Progress::Rejected;
@@ -152,7 +151,7 @@ impl<S: Real, const NX: usize, const NU: usize, const N: usize> Ilqr<S, NX, NU, 
             let expected = -(alpha * linear + alpha * alpha * quadratic);
             let reduced = self.cost - cost;
             if cost.is_finite() && reduced > S::constant(1e-4) * expected {
-                let part = (reduced / self.cost).to_f64();
+                let part = reduced / self.cost;
                 self.cost = cost;
                 self.take();
                 self.regular = self.regular * S::constant(0.1);

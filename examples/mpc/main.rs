@@ -3,6 +3,7 @@
 //!
 //! `cargo run --release --example mpc`
 
+mod acrobot;
 mod ilqr;
 mod steps;
 #[cfg(test)]
@@ -10,7 +11,9 @@ mod tests;
 
 use std::time::Instant;
 
+use acrobot::{JOINTS, LENGTH, NODES, PUSH};
 use ilqr::{Ilqr, Problem, Progress};
+use multibody::runtime::{Differentiable, Real, Scalar, StateDerivatives};
 use steps::{Dynamics, Steps};
 
 multibody::mbd_model! {
@@ -25,28 +28,16 @@ multibody::mbd_model! {
     outputs = [rates, derivatives, bias, momenta],
 }
 
-/// Two bars of 1 m and 1 kg, a motor at the elbow only.
-fn acrobot(length: f64) -> Steps<Acrobot, f64, 1> {
-    let drive = |arm: &mut Acrobot, u: &[f64; 1]| arm.tau = [0.0, u[0]];
-    Steps { system: Acrobot::new(), drive, joints: [1], length }
-}
-
 fn ur5(length: f64) -> Steps<Ur5, f64, 6> {
     Steps { system: Ur5::new(), drive: |arm, u| arm.tau = *u, joints: [0, 1, 2, 3, 4, 5], length }
 }
 
-/// Swings up in 5 s, from hanging down to standing up, with at most 4 N m.
-fn swing_up() -> (Box<Ilqr<f64, 4, 1, 201>>, Problem<f64, 4, 1>) {
-    let mut dynamics = acrobot(0.025);
-    let problem = Problem {
-        goal: [core::f64::consts::PI, 0.0, 0.0, 0.0],
-        running: [0.0; 4],
-        end: [1000.0, 1000.0, 200.0, 200.0],
-        effort: [0.01],
-        bounds: [[-4.0], [4.0]],
-    };
-    // Hanging down is at rest, and without a push it stays so.
-    let mut plan = Box::new(Ilqr::<f64, 4, 1, 201>::new(&mut dynamics, &problem, &[0.0; 4], &[0.1]));
+/// Swings the Acrobot up.
+fn swing_up() -> (Box<Ilqr<f64, 4, 1, NODES>>, Problem<f64, 4, 1>) {
+    let drive = |arm: &mut Acrobot, u: &[f64; 1]| arm.tau = [0.0, u[0]];
+    let mut dynamics = Steps { system: Acrobot::new(), drive, joints: JOINTS, length: LENGTH };
+    let problem = acrobot::problem();
+    let mut plan = Box::new(Ilqr::<f64, 4, 1, NODES>::new(&mut dynamics, &problem, &[0.0; 4], &[PUSH]));
     let (start, clock) = (plan.cost, Instant::now());
     let mut iterations = 0;
     while iterations < 500 {
@@ -58,8 +49,8 @@ fn swing_up() -> (Box<Ilqr<f64, 4, 1, 201>>, Problem<f64, 4, 1>) {
         }
     }
     let seconds = clock.elapsed().as_secs_f64();
-    let [a, b, ..] = plan.x[200];
-    let largest = plan.u[..200].iter().fold(0.0_f64, |m, u| m.max(u[0].abs()));
+    let [a, b, ..] = plan.x[NODES - 1];
+    let largest = plan.u[..NODES - 1].iter().fold(0.0_f64, |m, u| m.max(u[0].abs()));
     println!(
         "Acrobot: cost from {start:.1} to {:.4} in {iterations} iterations of {:.0} us ({} nodes)",
         plan.cost,
@@ -123,7 +114,7 @@ fn reach() -> f64 {
 /// Runs both.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (plan, problem) = swing_up();
-    let [a, b, p, r] = plan.x[200];
+    let [a, b, p, r] = plan.x[NODES - 1];
     assert!(
         (a - problem.goal[0]).abs() < 0.05 && b.abs() < 0.05 && p.abs() < 0.2 && r.abs() < 0.2,
         "{:?}",

@@ -1,6 +1,6 @@
 //! A mechanism in steps of the explicit midpoint rule, with exact derivatives.
 
-use multibody::runtime::{Differentiable, Real, StateDerivatives};
+use super::{Differentiable, Real, StateDerivatives};
 
 /// A system in steps, `x → f(x, u)`.
 pub trait Dynamics<S, const NX: usize, const NU: usize> {
@@ -45,7 +45,8 @@ where
         for (j, joint) in self.joints.iter().enumerate() {
             for i in 0..NX {
                 let one = if i == NV + joint { S::one() } else { S::zero() };
-                b[i][j] = h * (half * middle[i][NV + joint] + one);
+                let entry = middle[i].get(NV + joint).copied().unwrap_or_else(S::zero);
+                b[i][j] = h * (half * entry + one);
             }
         }
         for i in 0..NX {

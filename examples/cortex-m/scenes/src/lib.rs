@@ -4,6 +4,9 @@
 use mbd_runtime::constrained::{Projection, WithPostStep};
 use mbd_runtime::integrate::{Ab6, ImplicitMidpoint, Rk4, Stepper};
 use mbd_runtime::{Constrained, Differentiable, Energetic, Real, Scalar, System};
+use mpc::acrobot;
+use mpc::ilqr::Ilqr;
+use mpc::steps::{Dynamics, Steps};
 
 mbd_macros::mbd_model! {
     path = "../../../models/double_pendulum.toml",
@@ -41,6 +44,8 @@ mbd_macros::mbd_model! {
     scalar = f64,
     outputs = [rates, constraint_residuals, project_momenta, position_correction, multipliers, energy]
 }
+
+mod mpc;
 
 /// Number of steps of the short runs.
 pub const STEPS: u32 = 1000;
@@ -192,6 +197,47 @@ where
     watched(system, method, LOOP, (q, p), watch)
 }
 
+/// Iterations in which the Acrobot's swing is planned.
+pub const ITERATIONS: u32 = 120;
+
+/// Steps of the dynamics that are counted.
+struct Counted<D>(D, u64);
+
+impl<D: Dynamics<f32, 4, 1>> Dynamics<f32, 4, 1> for Counted<D> {
+    fn step(&mut self, x: &[f32; 4], u: &[f32; 1]) -> [f32; 4] {
+        self.1 += 2;
+        self.0.step(x, u)
+    }
+    fn linearise(&mut self, x: &[f32; 4], u: &[f32; 1], a: &mut [[f32; 4]; 4], b: &mut [[f32; 1]; 4]) {
+        self.1 += 2;
+        self.0.linearise(x, u, a, b);
+    }
+}
+
+/// Plans how the Acrobot swings up, by model predictive control's solver: a step is an iteration. The state is that at the end
+/// of the plan, and the energies are its cost, the first input and the largest.
+///
+/// # Errors
+/// [`Unusable`], where the plan ends more than 0.1 rad from upright.
+pub fn swing_up(system: &mut DoublePendulumF32) -> Result<End<DoublePendulumF32>, Unusable> {
+    let drive = |arm: &mut DoublePendulumF32, u: &[f32; 1]| arm.tau = [0.0, u[0]];
+    let steps = Steps { system: system.clone(), drive, joints: acrobot::JOINTS, length: acrobot::LENGTH as f32 };
+    let (mut dynamics, problem) = (Counted(steps, 0), acrobot::problem());
+    let push = [acrobot::PUSH as f32];
+    let mut plan = Ilqr::<f32, 4, 1, { acrobot::NODES }>::new(&mut dynamics, &problem, &[0.0; 4], &push);
+    for _ in 0..ITERATIONS {
+        plan.iterate(&mut dynamics, &problem);
+    }
+    let [a, b, c, d] = plan.x[acrobot::NODES - 1];
+    let off = |x: f32, goal: f32| x - goal < 0.1 && goal - x < 0.1;
+    if !(off(a, problem.goal[0]) && off(b, 0.0)) {
+        return Err(Unusable(ITERATIONS));
+    }
+    let largest = plan.u.iter().fold(0.0_f32, |m, u| if u[0] > m { u[0] } else { m });
+    let energy = Some([plan.cost, plan.u[0][0], largest]);
+    Ok(End { q: [a, b], p: [c, d], energy, steps: ITERATIONS, evaluations: dynamics.1 })
+}
+
 /// [`STEPS`] steps from rest, each joint 0.2 rad further than the one before.
 fn short<Y, M>(system: &mut Y, method: M) -> Result<End<Y>, Unusable>
 where
@@ -263,5 +309,6 @@ macro_rules! each_scene {
         $what!(ur5_minute_f32, $crate::Ur5F32, $crate::minute);
         $what!(fourbar_f32, $crate::FourbarF32, $crate::closed);
         $what!(fourbar_f64, $crate::FourbarF64, $crate::closed);
+        $what!(acrobot_mpc_f32, $crate::DoublePendulumF32, $crate::swing_up);
     };
 }
