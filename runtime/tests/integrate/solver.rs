@@ -257,6 +257,23 @@ impl<Y: System> PostStep<Y> for Refuses {
     }
 }
 
+/// A pendulum that gains hold against its weight comes to rest, where the forces cancel but for rounding. Steps must not
+/// follow that noise: they are as long as stability allows, some 4 to 20 in a second.
+#[test]
+fn rest_needs_few_steps() {
+    let rates = |_, q: &[f64; 1], p: &[f64; 1]| ([p[0]], [-9.81 * q[0].sin() + 50.0 * (0.8 - q[0]) - 20.0 * p[0]]);
+    for_each!(name, make => {
+        let mut y = Plain::new(rates);
+        let method = make!(&y);
+        let mut solver = adaptive(&mut y, method, 1e-9, (&[0.8], &[0.0]));
+        solver.limits.steps = 40_000;
+        let ran = solver.run(&mut y, 500.0);
+        assert!(ran.is_ok(), "{name}: {ran:?} at {} s", solver.time());
+        let end = state(&mut solver, &y);
+        assert!((50.0 * (0.8 - end[0]) - 9.81 * end[0].sin()).abs() < 1e-7, "{name}: {end:?}");
+    });
+}
+
 #[test]
 fn a_refused_end_keeps_its_reason() {
     // Wherever the steps become too small, the reason is that of the last attempt.
