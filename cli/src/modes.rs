@@ -49,6 +49,7 @@ pub fn run(args: &ModesArgs, out: &mut dyn Write) -> Outcome {
     let file = args.record.clone().unwrap_or_else(|| PathBuf::from(format!("{}.modes", model.name)));
     writable(&file)?;
     let (q, v, _) = simulate::start_closed(&plan, &args.motion)?;
+    let settings = simulate::controlled(&plan, &args.motion, settings, &q)?;
     verdict::start(&args.motion.model.model, &plan, &q)?;
     let touched = contacts::simulate(&plan, (q, v), &settings, false)?;
     write_files(&[(file.as_path(), modes::text(model, &touched.visits).as_str())])?;

@@ -85,7 +85,8 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     }
     let settings = Settings { every: every(args)?, project: args.project, ..settings(&args.motion)? };
     let (q, v, assembly) = start_closed(&plan, &args.motion)?;
-    let settings = controlled(&plan, args, settings, &q)?;
+    refuse_with_control(args)?;
+    let settings = controlled(&plan, &args.motion, settings, &q)?;
     let columns = columns::chosen(&plan, &args.columns, settings.control.is_some())?;
     let csv = args.csv.clone().unwrap_or_else(|| PathBuf::from(format!("{}.csv", model.name)));
     let svg = args.svg.clone().unwrap_or_else(|| PathBuf::from(format!("{}.svg", model.name)));
@@ -174,25 +175,29 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     }
 }
 
-/// Settings with the control of the arguments, if there is any.
-fn controlled<'a>(plan: &Plan, args: &SimulateArgs, settings: Settings<'a>, q: &[f64]) -> Outcome<Settings<'a>> {
-    let control = Controller::new(plan, &args.motion.control, q, &columns::all(plan))?;
-    let Some(control) = control else { return Ok(settings) };
-    let refused = |what: &str, help: &str| Err(Failure::new(what, help));
-    if args.project {
-        return refused("--project keeps the energy, which the control changes", "leave --project out");
-    }
-    if args.trust == Some(Trust::Wide) {
-        return refused("--trust wide does not know the control", "take --trust without `wide`");
-    }
+/// Settings with the control of the arguments, if there is any, for a motion that starts at `q`.
+pub fn controlled<'a>(plan: &Plan, args: &MotionArgs, settings: Settings<'a>, q: &[f64]) -> Outcome<Settings<'a>> {
+    let control = Controller::new(plan, &args.control, q, &columns::all(plan))?;
     let explicit = catalogue::EXPLICIT.iter().any(|entry| entry.name == settings.method);
-    if !control.has_derivatives() && !explicit {
+    if control.as_ref().is_some_and(|control| !control.has_derivatives()) && !explicit {
         let names: Vec<&str> = catalogue::EXPLICIT.iter().map(|entry| entry.name).collect();
-        let what =
-            format!("--method {}: the derivatives of --gravity-compensation are not known to it", settings.method);
-        return refused(&what, &format!("take one of {}", names.join(", ")));
+        return Err(Failure::new(
+            format!("--method {}: the derivatives of --gravity-compensation are not known to it", settings.method),
+            format!("take one of {}", names.join(", ")),
+        ));
     }
-    Ok(Settings { control: Some(control), ..settings })
+    Ok(Settings { control, ..settings })
+}
+
+/// Refuses what a motion under control cannot be asked for.
+fn refuse_with_control(args: &SimulateArgs) -> Outcome {
+    if args.motion.control.any() && args.project {
+        return Err(Failure::new("--project keeps the energy, which the control changes", "leave --project out"));
+    }
+    if args.motion.control.any() && args.trust == Some(Trust::Wide) {
+        return Err(Failure::new("--trust wide does not know the control", "take --trust without `wide`"));
+    }
+    Ok(())
 }
 
 /// What the control was, and what it asked of the joints.

@@ -241,6 +241,10 @@ fn contacts_feel_the_control() {
     // a = -1 m/s² for two seconds.
     close(rows.last("q.track"), 1.0 - 2.0, 1e-9);
     assert_eq!(rows.last("force.track/upper.n"), 0.0);
+    // Its modes are visited in turn, which a free block would not.
+    let modes = ["modes", &model, "--efforts", &table, "--time", "5", "--q", "0", "--v", "0"];
+    let text = out(&good(run_in(&folder, &modes))).to_string();
+    assert!(text.contains("Sets of modes that it visits: 2"), "{text}");
     let stepping = ["--contacts", "stepping", "--contact-step", "0.001"];
     run(&folder, &model, &[&arguments[..], &stepping].concat());
     close(Rows::read(&folder, "block.csv").last("q.track"), 1.0 - 2.0, 0.01);
