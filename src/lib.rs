@@ -1,6 +1,6 @@
 //! Symbolic code generator for multibody dynamics in Hamilton's canonical form.
 //!
-#![doc = include_str!("../docs/guide.md")]
+#![doc = include_str!("guide.md")]
 //!
 //! # Features
 //! | feature | default | adds |
@@ -71,19 +71,16 @@ pub use mbd_runtime as runtime;
 /// | `efforts = false` | whether joint forces `tau` are inputs | `true` |
 /// | `frames = [tool0, "left-foot"]` | frames and bodies of the outputs that have a result for each frame; asks for `frames` where none of them is named | all |
 /// | `snap = 0.0` | angles this close to right angles become exact, rad | `1e-6` |
-/// | `modes = recorded("robot.modes")` | code for the modes of contacts (`docs/contacts.md`): `masked` for functions in which numbers say which contacts act; beside them functions for `all` sets of modes, for those of a file that `mbd simulate --record-modes` writes, or for those of a list, `["open open", "stick open"]` | contacts are no part of the code |
+/// | `modes = recorded("robot.modes")` | code for the modes of contacts (`book/src/contacts.md`): `masked` for functions in which numbers say which contacts act; beside them functions for `all` sets of modes, for those of a file that `mbd simulate --record-modes` writes, or for those of a list, `["open open", "stick open"]` | contacts are no part of the code |
 /// | `runtime = path::to::mbd_runtime` | the runtime crate | that of this crate |
 ///
-/// # Outputs
-/// Each output is a function of the type, `arm.rates(&q, &p, &mut qd, &mut pd)`: its arguments first, then its results.
-///
-#[doc = include_str!("../docs/outputs.md")]
+#[doc = include_str!("../book/src/outputs.md")]
 ///
 /// # What is made
 /// A type `Arm` with `new()`, a function for each output, the constants `NQ` and `NV` (numbers of coordinates and of
 /// velocities), names and indices of the coordinates (`Arm::Q_ELBOW`), and fields for what is given beside the state:
 /// joint forces `tau`, prescribed motions, wrenches, parameters. With `rates` among the outputs it is a
-/// [`System`](runtime::System) for the integrators. States are described in `docs/model-format.md`.
+/// [`System`](runtime::System) for the integrators. States are described in `book/src/model-format.md`.
 ///
 /// The expansion needs no standard library. A crate without one depends on `mbd-macros` and on `mbd-runtime` with
 /// `default-features = false` and calls `mbd_macros::mbd_model!`.
@@ -104,22 +101,21 @@ macro_rules! mbd_model {
     };
 }
 
-/// The code in the guide compiles and runs.
+/// The programs of the book compile and run.
 #[cfg(doctest)]
-#[doc = include_str!("../docs/integrators.md")]
-struct Guide;
-
-/// So does that of the page on constraints.
-#[cfg(doctest)]
-#[doc = include_str!("../docs/constraints.md")]
-struct Constraints;
-
-/// And that of the page on contacts.
-#[cfg(doctest)]
-#[doc = include_str!("../docs/contacts.md")]
-struct Contacts;
-
-/// And that of the page on changing trees.
-#[cfg(doctest)]
-#[doc = include_str!("../docs/variants.md")]
-struct Variants;
+mod book {
+    #[doc = include_str!("../book/src/first-mechanism.md")]
+    struct FirstMechanism;
+    #[doc = include_str!("../book/src/robot.md")]
+    struct Robot;
+    #[doc = include_str!("../book/src/first-loop.md")]
+    struct FirstLoop;
+    #[doc = include_str!("../book/src/integrators.md")]
+    struct Integrators;
+    #[doc = include_str!("../book/src/constraints.md")]
+    struct Constraints;
+    #[doc = include_str!("../book/src/contacts.md")]
+    struct Contacts;
+    #[doc = include_str!("../book/src/variants.md")]
+    struct Variants;
+}

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use multibody::codegen::model::{Coordinate, Unit, Value};
+use multibody::codegen::model::{Coordinate, Model, Unit, Value};
 use multibody::codegen::modes;
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
@@ -462,7 +462,7 @@ fn start(plan: &Plan, args: &MotionArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
     }
     let names = plan.coordinate_names();
     let mut q = list("q", &args.q, names.clone(), default_start(plan))?;
-    let speed = if plan.model.contacts.is_empty() { 0.1 } else { 0.0 };
+    let speed = if states_start(&plan.model) || args.control.any() { 0.0 } else { 0.1 };
     let default = plan.start_velocity().unwrap_or_else(|| vec![speed; plan.dims.nv]);
     let v = list("v", &args.v, plan.velocity_names(), default)?;
     let interpreter: Interpreter<f64> = plan.default_interpreter();
@@ -506,11 +506,16 @@ fn end_of_run(plan: &Plan, file: &Path) -> Outcome<(Vec<f64>, Vec<f64>)> {
     Ok((state, v))
 }
 
+/// Whether the description says where a motion starts: a mechanism with loops or contacts has a meaning only somewhere.
+fn states_start(model: &Model) -> bool {
+    !model.constraints.is_empty() || !model.starts.is_empty() || !model.contacts.is_empty()
+}
+
 /// The default start; `mbd simulate --help` states it.
 pub fn default_start(plan: &Plan) -> Vec<f64> {
     let interpreter: Interpreter<f64> = plan.default_interpreter();
     let model = &plan.model;
-    if !model.constraints.is_empty() || !model.starts.is_empty() || !model.contacts.is_empty() {
+    if states_start(model) {
         return plan.start();
     }
     let mut q = interpreter.neutral();

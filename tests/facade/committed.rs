@@ -294,7 +294,7 @@ check!(
 
 #[test]
 fn the_documented_table_of_outputs_is_that_of_the_code() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/outputs.md");
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/book/src/outputs.md");
     let (documented, table) = (std::fs::read_to_string(path).expect("the table"), multibody::codegen::output::table());
-    assert!(documented == table, "docs/outputs.md should be\n{table}");
+    assert!(documented.ends_with(&table), "book/src/outputs.md should end with\n{table}");
 }

@@ -2,6 +2,7 @@
 
 mod base;
 mod batch;
+mod book;
 mod committed;
 mod contacts;
 mod counts;

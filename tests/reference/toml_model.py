@@ -1,4 +1,4 @@
-"""Reads a model in the TOML format of this project (docs/model-format.md) into Pinocchio.
+"""Reads a model in the TOML format of this project (book/src/model-format.md) into Pinocchio.
 
 Written apart from the project's own reader, as a second opinion on what the format means. Trusts its input.
 """

@@ -107,11 +107,11 @@ pub enum Language {
 #[command(
     after_help = "Rust depends on the runtime alone: no allocation, no std. C depends on nothing: `-o robot.c` writes robot.c and robot.h.
 A unit for model exchange has rates, velocities and energies in doubles, its sources, and a shared library where a C compiler is found
-(docs/c.md). The comment at the top lists the order of the state and the operations of each function. The same model and
+(in the book: C99). The comment at the top lists the order of the state and the operations of each function. The same model and
 options give the same bytes everywhere.
 
 WebAssembly is written to three files: `-o robot.wasm` also writes robot.js, a wrapper, and robot.d.ts, its types.
-docs/webassembly.md shows how to use them.
+The book's page on WebAssembly shows how to use them.
 
 In a crate that depends on `multibody`, write `include!(\"robot.rs\");` in a module of its own, or `mod robot;` where the
 file lies beside the sources. In a crate that depends on `mbd-runtime` alone (firmware), add --runtime ::mbd_runtime."

@@ -234,7 +234,7 @@ pub struct CountArgs {
 #[command(after_help = "Input:   {\"states\": [{\"q\": [..], \"v\": [..], \"tau\": [..]}, ..]}
 Output:  {\"states\": [{\"p\": [..], \"qd\": [..], \"pd\": [..], \"qdd\": [..], \"kinetic\": T, \"potential\": V, \"M\": [[..], ..]}, ..]}
 
-`tau` is optional (zeros). docs/eval-json.md describes further inputs (wrenches, prescribed motions, gravity,
+`tau` is optional (zeros). The book's page on its JSON describes further inputs (wrenches, prescribed motions, gravity,
 parameters), the layouts, and every output. In contrast to the other commands, eval takes all numbers of the file
 exactly (--snap 0), for comparison with programs that do the same.")]
 pub struct EvalArgs {
@@ -304,7 +304,7 @@ are at zero, parameters have their defaults. As in `mbd eval`, all numbers of th
 
 Where all entries are numbers, every output is computed in doubles and printed with a bound on its error. Otherwise it is bounded
 over the box: by interval arithmetic, by the mean value form, and in parts (--split), of which the union is printed. All bounds
-hold for exact arithmetic with the numbers of the model as they were read. docs/trust.md says what that costs, and where bounds
+hold for exact arithmetic with the numbers of the model as they were read. The book's page on trust says what that costs, and where bounds
 are too wide to be of use. An output without a bound is an error, after the others have been printed.")]
 pub struct CertifyArgs {
     #[command(flatten)]
@@ -333,7 +333,7 @@ pub struct CertifyArgs {
 #[derive(Args)]
 #[command(
     after_help = "Without one of the options under Control, the motion is free: joint forces and wrenches are zero. Prescribed joints are
-at rest, dampers and springs of the model act. docs/control.md describes motion under control: its efforts are limited to what the
+at rest, dampers and springs of the model act. The book describes motion under control: its efforts are limited to what the
 joints are made for, and the report tells where positions and speeds leave their bounds.
 
 An interrupt (Ctrl-C) ends the run early: the table and the plot then hold what was computed, and the exit status is 130.
@@ -343,10 +343,11 @@ they are fixed, by the classical Runge-Kutta method of order 4 unless --method s
 equal times, between the steps by dense output.
 
 The start, unless --q and --v say otherwise: angles 0.3 and -0.3 rad in turn, displacements 0.05 m, planar, spherical and
-floating joints neutral; every velocity 0.1 (rad/s or m/s). A model with `start`s, loops or couplings starts from its `start`s,
-neutral where it states none. A position outside the range of its joint is moved to the middle of it. Loops are closed from
-there (from --q, if given) without moving `held` joints. Velocities then follow from those of the `held` joints; where none is
-held, they are the nearest ones that satisfy the constraints.
+floating joints neutral; every velocity 0.1 (rad/s or m/s), or zero under control. A model with `start`s, loops, couplings or
+contacts starts from its `start`s, neutral where it states none, at rest or with its `start_velocity`s. A position outside the
+range of its joint is moved to the middle of it. Loops are closed from there (from --q, if given) without moving `held` joints.
+Velocities then follow from those of the `held` joints; where none is held, they are the nearest ones that satisfy the
+constraints.
 
 Without dampers the energy is constant; with dampers it changes by their work. What it changes by otherwise is an error of the
 simulation. It is printed relative to the largest kinetic energy, as a multiple of the tolerance, and beside what errors of the

@@ -1,4 +1,4 @@
-//! `mbd certify`: guaranteed bounds of outputs at a state, and over a box of states. `docs/trust.md` says what exactly
+//! `mbd certify`: guaranteed bounds of outputs at a state, and over a box of states. `book/src/trust.md` says what exactly
 //! is guaranteed.
 
 mod bounds;

@@ -1,4 +1,4 @@
-//! `mbd eval`: evaluates states with the interpreter. `docs/eval-json.md` describes input and output.
+//! `mbd eval`: evaluates states with the interpreter. `book/src/eval-json.md` describes input and output.
 
 mod input;
 mod outer;

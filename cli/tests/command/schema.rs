@@ -86,8 +86,9 @@ fn files(folder: &Path, all: &mut Vec<PathBuf>) {
 #[test]
 fn the_schema_takes_what_the_reader_takes() {
     let printed = good(run(&["completions", "schema"]));
-    let committed = std::fs::read_to_string(format!("{ROOT}/docs/model.schema.json")).expect("the committed schema");
-    assert_eq!(out(&printed), committed, "`mbd completions schema > docs/model.schema.json` writes it anew");
+    let committed =
+        std::fs::read_to_string(format!("{ROOT}/book/src/model.schema.json")).expect("the committed schema");
+    assert_eq!(out(&printed), committed, "`mbd completions schema > book/src/model.schema.json` writes it anew");
     let schema = json_of(&printed);
     let mut sound = Vec::new();
     files(&Path::new(ROOT).join("models"), &mut sound);

@@ -20,9 +20,9 @@ fn module_wrapper_and_types() {
     let output = good(generate("double_pendulum.wasm"));
     assert!(out(&output).is_empty());
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).expect("a file");
-    let commented: String = block("docs/webassembly.md").lines().map(|line| format!("// {line}\n")).collect();
+    let commented: String = block("book/src/webassembly.md").lines().map(|line| format!("// {line}\n")).collect();
     for name in ["double_pendulum.js", "double_pendulum.d.ts"] {
-        assert!(read(name).contains(&commented), "docs/webassembly.md should have the table of\n{}", read(name));
+        assert!(read(name).contains(&commented), "book/src/webassembly.md should have the table of\n{}", read(name));
     }
     if !is_there("node") {
         return;

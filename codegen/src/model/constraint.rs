@@ -603,12 +603,12 @@ mod tests {
 
     #[test]
     fn the_documents_have_the_same_table() {
-        let document = include_str!("../../../docs/model-format.md");
+        let document = include_str!("../../../book/src/model-format.md");
         for spec in &LOOPS {
             let keys: Vec<String> = spec.keys().filter(|key| *key != "decay").map(|key| format!("`{key}`")).collect();
             let row =
                 format!("| `{}` | {} | {} |", spec.word(), keys.join(", "), spec.rows.len()).replace("|  |", "| |");
-            assert!(document.lines().any(|line| line.starts_with(&row)), "docs/model-format.md has no row\n{row}");
+            assert!(document.lines().any(|line| line.starts_with(&row)), "book/src/model-format.md has no row\n{row}");
         }
     }
 }

@@ -147,11 +147,11 @@ mod tests {
         ];
         assert_eq!(all.map(|kind| *kind.spec()), SHAPES);
         Words::assert_distinct(SHAPES.iter().map(|spec| &spec.words));
-        let document = include_str!("../../../docs/model-format.md");
+        let document = include_str!("../../../book/src/model-format.md");
         for spec in &SHAPES {
             let keys: Vec<String> = spec.keys.iter().map(|key| format!("`{key}`")).collect();
             let row = format!("| `{}` | {} |", spec.word(), keys.join(", ")).replace("|  |", "| |");
-            assert!(document.lines().any(|line| line.starts_with(&row)), "docs/model-format.md has no row\n{row}");
+            assert!(document.lines().any(|line| line.starts_with(&row)), "book/src/model-format.md has no row\n{row}");
         }
     }
 }

@@ -495,7 +495,7 @@ mod tests {
 
     #[test]
     fn the_documents_have_the_same_table() {
-        let document = include_str!("../../../docs/model-format.md");
+        let document = include_str!("../../../book/src/model-format.md");
         let quoted = |words: &[&str]| words.iter().map(|word| format!("`{word}`")).collect::<Vec<_>>().join(", ");
         for spec in &JOINTS {
             let keys = [&["axis", "axis2"][..spec.axes.len()], if spec.pitch { &["pitch"] } else { &[] }].concat();
@@ -509,7 +509,7 @@ mod tests {
             let cells = [quoted(&[spec.word()]), quoted(spec.words.aliases), quoted(&keys), q.join(", "), v.join(", ")];
             let row = cells.map(|cell| if cell.is_empty() { "|".into() } else { format!("| {cell} ") }).join("");
             let row = row.replace("||", "| |").replace("||", "| |");
-            assert!(document.lines().any(|line| line.starts_with(&row)), "docs/model-format.md has no row\n{row}");
+            assert!(document.lines().any(|line| line.starts_with(&row)), "book/src/model-format.md has no row\n{row}");
         }
     }
 }

@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 /// `mbd-lab experiments`.
 #[derive(Args)]
 #[command(
-    after_help = "docs/experiments.md says what is measured and how. The interpreter runs everything; with the generated code that
+    after_help = "The book (`book/src/experiments.md`) says what is measured and how. The interpreter runs everything; with the generated code that
 ordinary builds leave out, `scaling` times that too. At the root of the repository:
   cargo run --release -p mbd-lab --features generated -- experiments scaling --out figures"
 )]

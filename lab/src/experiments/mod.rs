@@ -1,4 +1,4 @@
-//! `mbd-lab experiments`: repeats chapter 7 of the thesis and prints its numbers for comparison. `docs/experiments.md`
+//! `mbd-lab experiments`: repeats chapter 7 of the thesis and prints its numbers for comparison. `book/src/experiments.md`
 //! states the decisions on points that the thesis leaves open.
 
 mod biped;

@@ -9,7 +9,7 @@
 //! states and compares the errors that 99 of 100 states stay below. Errors below two roundings of the largest entry are
 //! not compared: there the articulated elimination may be exact by chance.
 //!
-//! The report, `docs/accuracy.md`, is written by
+//! The report, `book/src/accuracy.md`, is written by
 //! `cargo test --release -p mbd-testing --test code eliminations -- --ignored --nocapture`.
 
 use std::fmt::Write;
@@ -268,7 +268,7 @@ fn report() -> Result<(), std::fmt::Error> {
     all.iter().try_for_each(|l| writeln!(text, "{}", l.causes))?;
     text += REFUSED_HEAD;
     text.extend(all.iter().map(|l| l.refused.as_str()));
-    std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/accuracy.md"), text).expect("the report");
+    std::fs::write(concat!(env!("CARGO_MANIFEST_DIR"), "/../book/src/accuracy.md"), text).expect("the report");
     let beyond: Vec<String> = all.into_iter().filter_map(|l| l.beyond).collect();
     assert!(beyond.is_empty(), "{}", beyond.join("\n"));
     Ok(())

@@ -1,4 +1,4 @@
-//! The TOML model format (docs/model-format.md). Here: the document and its top level.
+//! The TOML model format (book/src/model-format.md). Here: the document and its top level.
 
 mod base;
 mod constraints;
