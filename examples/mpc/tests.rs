@@ -155,7 +155,10 @@ fn weighed_velocities_have_exact_derivatives() {
         dynamics.linearise(&x, &[0.0; 6], &mut a, &mut b);
         let y = dynamics.weighed_again(&x, false);
         assert_eq!(y, dynamics.weighed_again(&x, true));
-        assert_eq!(y, dynamics.step_weighed(&x, &[0.0; 6]).1);
+        // Another function computes these, with other roundings.
+        let again = dynamics.step_weighed(&x, &[0.0; 6]).1;
+        let largest = y.iter().fold(1.0_f64, |m, y| m.max(y.abs()));
+        assert!(y.iter().zip(&again).all(|(y, z)| (y - z).abs() < 1e-12 * largest), "{y:?} {again:?}");
         let h = 1e-5;
         let j = SMatrix::<f64, 12, 12>::from_columns(&core::array::from_fn::<_, 12, _>(|k| {
             let [above, below] = [h, -h].map(|h| {

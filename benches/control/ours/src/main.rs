@@ -106,7 +106,8 @@ where
     }
 
     fn run<const N: usize>(&mut self, solves: usize) {
-        let mut plan = Box::new(Ilqr::<f64, NX, NU, N>::new(&mut self.dynamics, &self.problem, &self.start, &self.guess));
+        let mut plan =
+            Box::new(Ilqr::<f64, NX, NU, N>::new(&mut self.dynamics, &self.problem, &self.start, &self.guess));
         let (first, mut costs, mut tried) = (plan.cost, Vec::new(), Vec::new());
         self.solve(&mut plan, |cost, count| {
             costs.push(cost);
