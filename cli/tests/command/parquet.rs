@@ -1,6 +1,10 @@
 //! Tables as Parquet.
 
-use crate::run::{bad, folder, good, run_in, ROOT};
+#[cfg(not(feature = "parquet"))]
+use crate::run::bad;
+#[cfg(feature = "parquet")]
+use crate::run::good;
+use crate::run::{folder, run_in, ROOT};
 
 const NAME: &str = "motion.parquet";
 
