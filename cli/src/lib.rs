@@ -33,6 +33,7 @@ mod rivals;
 mod simulate;
 mod source;
 mod stale;
+mod tables;
 mod timed;
 mod tour;
 mod trust;

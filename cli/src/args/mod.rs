@@ -368,7 +368,8 @@ pub struct SimulateArgs {
     /// numbers; print the error of every coordinate at the end, how fast errors grow, and when no digit is left
     #[arg(long, value_enum, value_name = "HOW", num_args = 0..=1, default_missing_value = "tenth")]
     pub trust: Option<Trust>,
-    /// Table to write [default: NAME.csv in the current directory]
+    /// Table to write; Parquet if the name ends in .parquet and the program was built with that feature, else CSV [default:
+    /// NAME.csv in the current directory]
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
     /// Plot to write [default: NAME.svg in the current directory]

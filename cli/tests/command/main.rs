@@ -8,6 +8,7 @@ mod control;
 mod documented;
 mod eval;
 mod loops;
+mod parquet;
 mod run;
 mod schema;
 mod trust;
