@@ -80,7 +80,7 @@ fn rules(inks: &Inks) -> String {
     );
     for (k, line) in lines.iter().enumerate() {
         let tinted = mixed(line, paper, *tint);
-        let _ = write!(css, ".c{k}{{stroke:{line}}}.k{k}{{fill:{line}}}.b{k}{{fill:{tinted};stroke:{tinted}}}");
+        let _ = write!(css, ".b{k}{{fill:{tinted};stroke:{tinted}}}.c{k}{{stroke:{line}}}.k{k}{{fill:{line}}}");
     }
     css
 }
@@ -91,7 +91,7 @@ pub fn style() -> String {
         "text{font:12px system-ui,-apple-system,'Segoe UI',Roboto,'DejaVu Sans',Helvetica,Arial,sans-serif}\
          .small{font-size:11px}.head{font-weight:600}.end{text-anchor:end}.mid{text-anchor:middle}\
          .curve{stroke-width:1.6;stroke-linejoin:round;stroke-linecap:butt}\
-         .grid,.axis,.floor{stroke-width:1}.round{stroke-linecap:round;stroke-linejoin:round}",
+         .grid,.axis,.floor{stroke-width:1}.glass{fill-opacity:.72}.round{stroke-linecap:round;stroke-linejoin:round}",
     );
     for (k, dashes) in PATTERNS.iter().enumerate() {
         let _ = write!(css, ".d{}{{stroke-dasharray:{dashes}}}", k + 1);

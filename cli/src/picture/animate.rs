@@ -156,11 +156,10 @@ fn moving_part(text: &mut String, clock: &Clock, part: usize, mut outlines: Vec<
         matched(&mut outlines);
         let values: Vec<String> = outlines.iter().map(|o| Outline::path(&o.corners)).collect();
         let first = &outlines[0];
-        let ([edge, fill], [wide, narrow]) = (first.classes(), first.widths());
         let inside = clock.animation("d", &values);
-        // The path is written once, and drawn with its edge and within it.
+        // The path is written once, and drawn with each of its strokes.
         let _ = writeln!(text, "<defs><path id=\"p{part}\" d=\"{}\">{inside}</path></defs>", values[0]);
-        for (class, width) in [(edge, wide), (fill, narrow)] {
+        for (class, width) in first.strokes() {
             let _ = writeln!(text, "<use href=\"#p{part}\" class=\"round {class}\" stroke-width=\"{width:.1}\"/>");
         }
     }
@@ -211,13 +210,15 @@ fn arrows(text: &mut String, sheet: &Sheet, clock: &Clock, instants: &[Instant])
                 place = from;
             }
             let [x, y] = place;
-            let point = || [format!("M{x:.1} {y:.1}L{x:.1} {y:.1}"), format!("M{x:.1} {y:.1}L{x:.1} {y:.1}L{x:.1} {y:.1}Z")];
+            let point =
+                || [format!("M{x:.1} {y:.1}L{x:.1} {y:.1}"), format!("M{x:.1} {y:.1}L{x:.1} {y:.1}L{x:.1} {y:.1}Z")];
             ends.and_then(|[from, to]| arrow_paths(from, to)).unwrap_or_else(point)
         });
         let (shafts, tips): (Vec<String>, Vec<String>) = paths.map(|[shaft, tip]| (shaft, tip)).unzip();
         for (values, width) in [(shafts, 2.0), (tips, 0.0)] {
             let inside = clock.animation("d", &values);
-            let _ = writeln!(text, "<path class=\"force\" stroke-width=\"{width}\" d=\"{}\">{inside}</path>", values[0]);
+            let _ =
+                writeln!(text, "<path class=\"force\" stroke-width=\"{width}\" d=\"{}\">{inside}</path>", values[0]);
         }
     }
 }

@@ -7,16 +7,14 @@ use super::view::{Page, View, FOOT, MARGIN, WIDTH};
 use crate::ink::escaped;
 
 /// Size of the support of a joint, pixels.
-const SUPPORT: f64 = 11.0;
+const SUPPORT: f64 = 15.0;
 
 /// Supports of the points that hold the mechanism: the usual triangle on hatched ground where it is seen from its side, a
 /// piece of floor in space. `down` is the direction of gravity.
 pub fn supports(text: &mut String, page: &Page, view: &View, points: &[[f64; 3]], down: Option<[f64; 3]>) {
-    let mut points = points.to_vec();
-    points.dedup();
     if view.sees_a_plane() {
         let mut done: Vec<[f64; 2]> = Vec::new();
-        for p in &points {
+        for p in points {
             let place = page.place(view.project(*p));
             if done.iter().all(|q| (place[0] - q[0]).hypot(place[1] - q[1]) > 2.0) {
                 support(text, place, down.map_or([0.0, -1.0], |d| view.project(d)));
@@ -25,22 +23,33 @@ pub fn supports(text: &mut String, page: &Page, view: &View, points: &[[f64; 3]]
         }
         return;
     }
+    for corners in pieces(points, page.size(), down) {
+        let list: Vec<String> =
+            corners.iter().map(|p| page.place(view.project(*p))).map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
+        let _ = writeln!(text, "<polygon class=\"floor\" points=\"{}\"/>", list.join(" "));
+    }
+}
+
+/// The pieces of floor below the points that hold a mechanism of some size, m: their corners.
+pub fn pieces(points: &[[f64; 3]], size: f64, down: Option<[f64; 3]>) -> Vec<[[f64; 3]; 4]> {
     let down = down.unwrap_or([0.0, 0.0, -1.0]);
     let n = down.map(|x| -x);
     let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    let bounds = |axis: &[f64; 3]| points.iter().fold((f64::MAX, f64::MIN), |(a, b), p| (a.min(dot(p, axis)), b.max(dot(p, axis))));
+    let bounds = |axis: &[f64; 3]| {
+        points.iter().fold((f64::MAX, f64::MIN), |(a, b), p| (a.min(dot(p, axis)), b.max(dot(p, axis))))
+    };
     let (low, high) = bounds(&n);
-    let pad = 0.07 * page.size();
+    let pad = 0.07 * size;
     if points.is_empty() {
-        return;
+        return Vec::new();
     }
     // One piece below all of them where they are at one height, or else one below each.
     let pieces: Vec<Vec<[f64; 3]>> = match high - low < 0.3 * pad {
-        true => vec![points.clone()],
+        true => vec![points.to_vec()],
         false => points.iter().map(|p| vec![*p]).collect(),
     };
     let pad = if pieces.len() > 1 { 0.5 * pad } else { pad };
-    for piece in pieces {
+    let corners = |piece: Vec<[f64; 3]>| {
         let [x, y] = across(n);
         let level = piece.iter().map(|p| dot(p, &n)).fold(f64::MAX, f64::min);
         let range = |axis: &[f64; 3]| {
@@ -48,11 +57,10 @@ pub fn supports(text: &mut String, page: &Page, view: &View, points: &[[f64; 3]]
             all.fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x - pad), b.max(x + pad)))
         };
         let ((a, b), (c, d)) = (range(&x), range(&y));
-        let corner = |s: f64, t: f64| page.place(view.project([0, 1, 2].map(|k| s * x[k] + t * y[k] + level * n[k])));
-        let list: Vec<String> =
-            [(a, c), (b, c), (b, d), (a, d)].iter().map(|(s, t)| corner(*s, *t)).map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
-        let _ = writeln!(text, "<polygon class=\"floor\" points=\"{}\"/>", list.join(" "));
-    }
+        let corner = |(s, t): (f64, f64)| [0, 1, 2].map(|k| s * x[k] + t * y[k] + level * n[k]);
+        [(a, c), (b, c), (b, d), (a, d)].map(corner)
+    };
+    pieces.into_iter().map(corners).collect()
 }
 
 /// The support of a joint in the plane.
@@ -74,7 +82,13 @@ fn round(x: f64) -> f64 {
 }
 
 /// The foot of the picture: scale, that of forces in m on the page per N where there are any, gravity, and the caption.
-pub fn foot(text: &mut String, (page, view): (&Page, &View), caption: &str, force: Option<f64>, down: Option<[f64; 3]>) {
+pub fn foot(
+    text: &mut String,
+    (page, view): (&Page, &View),
+    caption: &str,
+    force: Option<f64>,
+    down: Option<[f64; 3]>,
+) {
     let length = round(WIDTH / 6.0 / page.scale);
     let (y, to) = (page.height + 0.5 * FOOT, MARGIN + length * page.scale);
     let _ = writeln!(text, "<path class=\"axis\" d=\"M{MARGIN} {:.1}v8m0 -4H{to:.1}m0 -4v8\"/>", y - 4.0);

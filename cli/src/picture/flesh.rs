@@ -11,13 +11,19 @@ type Mat3 = [[f64; 3]; 3];
 const LIMB: f64 = 1500.0;
 /// Density of the smallest ball that a body is drawn as, kg/m³: steel.
 const BALL: f64 = 7800.0;
+/// Square of the thickness of a rod, as a part of that of its length, below which it is drawn as a limb.
+const SLENDER: f64 = 0.09;
 /// Largest radius of a limb, as a part of its length.
-const STOUT: f64 = 0.07;
+const STOUT: f64 = 0.045;
 
 /// Radius of a limb from its mass, kg, and its length, m.
 pub fn radius(mass: f64, length: f64) -> f64 {
     let radius = (mass.max(0.0) / (LIMB * std::f64::consts::PI * length.max(1e-9))).sqrt();
-    if radius.is_finite() { radius.min(STOUT * length) } else { 0.0 }
+    if radius.is_finite() {
+        radius.min(STOUT * length)
+    } else {
+        0.0
+    }
 }
 
 fn rotation(r: &Rotation, number: &dyn Fn(Value) -> f64) -> Mat3 {
@@ -50,8 +56,25 @@ fn applied(a: &Mat3, x: Vec3) -> Vec3 {
     a.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2])
 }
 
+/// Half of the only long axis, if the others are much shorter: the body is a rod.
+fn rod(a: &Mat3) -> Option<Vec3> {
+    // The power method; axes of similar length, for which it is slow, are no rod.
+    let mut axis = [0.61, 0.53, 0.59];
+    let mut size = 0.0;
+    for _ in 0..40 {
+        let moved = applied(a, axis);
+        size = moved.iter().fold(0.0_f64, |n, x| n.hypot(*x));
+        if size <= 0.0 || !size.is_finite() {
+            return None;
+        }
+        axis = moved.map(|x| x / size);
+    }
+    let rest = (a[0][0] + a[1][1] + a[2][2] - size).max(0.0);
+    (rest < SLENDER * size).then(|| axis.map(|x| x * size.sqrt()))
+}
+
 /// Points on an ellipsoid with the second moments of the body: its semi-axes are half of the edges of the cuboid with that
-/// mass and inertia, so that a thin rod gets its length. No semi-axis exceeds `most`, and a point mass is a small ball.
+/// mass and inertia; or the two ends of a thin rod. No semi-axis exceeds `most`, and a point mass is a small ball.
 pub fn points(body: &Body, number: &dyn Fn(Value) -> f64, most: f64) -> Vec<Vec3> {
     let (mass, com) = (number(body.mass), body.com.map(number));
     if mass.is_nan() || mass <= 0.0 {
@@ -74,6 +97,10 @@ pub fn points(body: &Body, number: &dyn Fn(Value) -> f64, most: f64) -> Vec<Vec3
         row[k] += ball * ball * if trace > ball * ball { 0.04 } else { 1.0 };
     }
     let turn = rotation(&body.inertia_axes, number);
+    if let Some(half) = rod(&a) {
+        let half = applied(&turn, half);
+        return [-1.0, 1.0].map(|end| std::array::from_fn(|k| com[k] + end * half[k])).to_vec();
+    }
     let surface = ellipsoid([0.0; 3], [1.0; 3]).into_iter().filter_map(|d| {
         let moved = applied(&a, d);
         let size = (0..3).map(|k| d[k] * moved[k]).sum::<f64>();

@@ -94,7 +94,11 @@ impl Scene<'_> {
 
     /// Row of the `k`-th of `n` instants that divide the record evenly.
     fn row(&self, k: usize, n: usize) -> usize {
-        if n < 2 { self.last() } else { (k * self.last() + (n - 1) / 2) / (n - 1) }
+        if n < 2 {
+            self.last()
+        } else {
+            (k * self.last() + (n - 1) / 2) / (n - 1)
+        }
     }
 
     fn frames(&mut self, row: usize) -> Frames {
@@ -131,8 +135,11 @@ struct Sheet {
     scale: Option<Scale>,
     /// Direction of gravity, if it is known and not zero.
     down: Option<[f64; 3]>,
-    grounds: Vec<([[f64; 3]; 4], [f64; 3])>,
+    grounds: Vec<Ground>,
 }
+
+/// A piece of ground: its corners in order, m, and its normal.
+type Ground = ([[f64; 3]; 4], [f64; 3]);
 
 /// The direction of a plan's gravity.
 fn gravity(plan: &Plan) -> Option<[f64; 3]> {
@@ -155,17 +162,31 @@ fn sheet(plan: &Plan, scene: &Scene, drawing: &Drawing, instants: &[Instant], pa
     let mut seen = joints;
     let mut grounds = Vec::new();
     if let (Some(touch), Some(last)) = (&scene.touch, instants.last()) {
-        let solids = instants.iter().flat_map(|i| touch.solids(&i.touched, false)).chain(touch.solids(&last.touched, true));
+        let solids =
+            instants.iter().flat_map(|i| touch.solids(&i.touched, false)).chain(touch.solids(&last.touched, true));
         seen.extend(solids.flat_map(|line| line.points).filter(finite));
         grounds = touch.grounds(&last.touched, &seen);
     }
     // What moves in a plane is seen from its side, whatever the widths of its shapes.
     let view = if flat.sees_a_plane() { flat } else { View::new(drawing.view, &seen) };
+    floors(scene, &seen, &mut grounds);
     let corners = || grounds.iter().flat_map(|(corners, _)| corners.iter().copied());
     let head = if paths.is_empty() { 0.0 } else { HEAD };
-    let all: Vec<[f64; 2]> = seen.iter().copied().chain(corners()).map(|p| view.project(p)).collect();
+    let supports = &scene.shapes.supports;
+    let extent = Page::new(seen.iter().map(|p| view.project(*p)), 0.0).size();
+    // Seen from their side, supports have a size on the page, for which its edge has room.
+    let pieces = if view.sees_a_plane() { Vec::new() } else { base::pieces(supports, extent, gravity(plan)) };
+    let all = seen.iter().copied().chain(corners()).chain(pieces.into_iter().flatten());
+    let all: Vec<[f64; 2]> = all.map(|p| view.project(p)).collect();
     let mut page = Page::new(all.iter().copied(), head);
-    let scale = Scale::new(instants.iter().flat_map(|i| &i.arrows), &page);
+    // Forces that are nothing but round-off are none.
+    let params = plan.default_params();
+    let mass = |v: Value| match v {
+        Value::Const(x) => x,
+        Value::Param(k) => params[k],
+    };
+    let least = 1e-8 * plan.model.bodies.iter().map(|b| mass(b.mass)).sum::<f64>();
+    let scale = Scale::new(instants.iter().flat_map(|i| &i.arrows), &page, least);
     if let Some(scale) = &scale {
         // Arrows fit on the page too.
         let ends = instants.iter().flat_map(|i| &i.arrows);
@@ -182,7 +203,28 @@ fn flat(plan: &Plan, drawing: &Drawing, instants: &[Instant], seen: &[[f64; 3]])
     let view = View::new(drawing.view, &origins);
     // A single body says nothing of a plane.
     let moves = plan.model.bodies.len() > 1 && origins.iter().any(|p| *p != origins[0]);
-    if view.sees_a_plane() && moves { view } else { View::new(drawing.view, seen) }
+    let view = if view.sees_a_plane() && moves { view } else { View::new(drawing.view, seen) };
+    // What stands on a floor is not seen from above unasked.
+    let above = drawing.view.is_none() && view.depth([0.0, 0.0, 1.0]).abs() > 0.999;
+    match above && !plan.model.contacts.is_empty() {
+        true => View::new(Some(view::OBLIQUE), seen),
+        false => view,
+    }
+}
+
+/// Adds the floors on which something rolls, as far as the mechanism goes.
+fn floors(scene: &Scene, seen: &[[f64; 3]], grounds: &mut Vec<Ground>) {
+    for floor in scene.shapes.floors.iter().filter(|f| f.iter().all(|x| x.is_finite())) {
+        let known = grounds.iter().any(|(corners, _)| (corners[0][2] - floor[2]).abs() < 1e-9);
+        let range = |k: usize| seen.iter().fold((floor[k], floor[k]), |(a, b), p| (a.min(p[k]), b.max(p[k])));
+        let ((a, b), (c, d)) = (range(0), range(1));
+        let pad = 0.05 * (b - a).max(d - c);
+        if !known {
+            let corner = |(x, y): (f64, f64)| [x, y, floor[2]];
+            let all = [(a - pad, c - pad), (b + pad, c - pad), (b + pad, d + pad), (a - pad, d + pad)];
+            grounds.push((all.map(corner), [0.0, 0.0, 1.0]));
+        }
+    }
 }
 
 /// The picture. `forces` are those of the contacts, along their rows, for every time of the record; nothing where none are
@@ -242,7 +284,11 @@ fn path_of(sheet: &Sheet, path: &[[f64; 3]]) -> String {
     let places = path.iter().map(|p| sheet.page.place(sheet.view.project(*p)));
     let list: Vec<String> =
         places.filter(|p| p.iter().all(|x| x.is_finite())).map(|[x, y]| format!("{x:.1} {y:.1}")).collect();
-    if list.is_empty() { String::new() } else { format!("M{}", list.join("L")) }
+    if list.is_empty() {
+        String::new()
+    } else {
+        format!("M{}", list.join("L"))
+    }
 }
 
 /// Indices of the parts from the farthest to the nearest; parts at the same distance keep their order in spite of rounding.
@@ -259,7 +305,7 @@ fn strobes(text: &mut String, sheet: &Sheet, instants: &[Instant]) {
     for (k, instant) in instants.iter().enumerate() {
         let last = k + 1 == instants.len();
         let part = (k + 1) as f64 / instants.len() as f64;
-        let opacity = if last { 1.0 } else { 0.1 + 0.25 * part * part };
+        let opacity = if last { 1.0 } else { 0.12 + 0.26 * part * part };
         let _ = writeln!(text, "<g opacity=\"{opacity:.2}\">");
         for at in by_depth(sheet, &instant.lines) {
             Outline::new(&instant.lines[at], &sheet.page, &sheet.view).draw(text, last);
@@ -295,7 +341,7 @@ fn name_bodies(
     };
     let names: Vec<names::Named> = named.iter().map(|(frame, name, k)| (place(at(*frame)), name.clone(), *k)).collect();
     let outlines = last.lines.iter().map(|line| Outline::new(line, page, view));
-    let mut drawn: Vec<[f64; 2]> = outlines.flat_map(|o| names::grains(&o.corners)).collect();
+    let mut drawn: Vec<[f64; 2]> = outlines.flat_map(|o| names::covered(&o.corners, o.width)).collect();
     drawn.extend(paths.iter().flatten().map(|p| place(*p)));
     if let Some(scale) = &sheet.scale {
         drawn.extend(last.arrows.iter().flat_map(|arrow| names::grains(&scale.ends(page, view, arrow))));

@@ -35,6 +35,24 @@ pub fn grains(corners: &[[f64; 2]]) -> Vec<[f64; 2]> {
     out
 }
 
+/// Points that stand for a body: its outline at both sides of its corners, and what is within, more loosely.
+pub fn covered(corners: &[[f64; 2]], width: f64) -> Vec<[f64; 2]> {
+    let n = corners.len().max(1) as f64;
+    let middle = [0, 1].map(|k| corners.iter().map(|c| c[k]).sum::<f64>() / n);
+    let mut out = Vec::new();
+    for part in [1.0, 0.7, 0.4] {
+        let shrunk: Vec<[f64; 2]> =
+            corners.iter().map(|c| [0, 1].map(|k| middle[k] + part * (c[k] - middle[k]))).collect();
+        out.extend(grains(&shrunk));
+    }
+    if width > 8.0 {
+        let at = |dx: f64, dy: f64| corners.iter().map(|c| [c[0] + dx, c[1] + dy]).collect::<Vec<_>>();
+        let r = 0.4 * width;
+        [(r, 0.0), (-r, 0.0), (0.0, r), (0.0, -r)].iter().for_each(|(dx, dy)| out.extend(grains(&at(*dx, *dy))));
+    }
+    out
+}
+
 /// Draws the names with leaders. `drawn` are points of what they had better not hide; `heights` bound the page.
 pub fn draw(text: &mut String, names: &[Named], drawn: &[[f64; 2]], heights: [f64; 2]) {
     let mut taken: Vec<Room> = Vec::new();
@@ -47,14 +65,15 @@ pub fn draw(text: &mut String, names: &[Named], drawn: &[[f64; 2]], heights: [f6
             let (s, c) = (std::f64::consts::TAU * direction as f64 / DIRECTIONS as f64).sin_cos();
             // The nearest edge of the name is at this distance.
             let middle = [place[0] + c * (distance + 0.5 * width), place[1] - s * (distance + 0.5 * HEIGHT)];
-            let room = [middle[0] - 0.5 * width, middle[1] - 0.5 * HEIGHT, middle[0] + 0.5 * width, middle[1] + 0.5 * HEIGHT];
+            let room =
+                [middle[0] - 0.5 * width, middle[1] - 0.5 * HEIGHT, middle[0] + 0.5 * width, middle[1] + 0.5 * HEIGHT];
             let inside = room[0] > 6.0 && room[2] < WIDTH - 6.0 && room[1] > heights[0] && room[3] < heights[1];
             if !inside || taken.iter().any(|other| overlap(&room, other)) {
                 continue;
             }
             let air = [room[0] - 3.0, room[1] - 2.0, room[2] + 3.0, room[3] + 2.0];
             let hidden = drawn.iter().filter(|p| overlap(&air, &[p[0], p[1], p[0], p[1]])).count();
-            let cost = 6.0 * hidden as f64 + distance;
+            let cost = 3.0 * hidden as f64 + distance;
             if best.is_none_or(|(least, _)| cost < least) {
                 best = Some((cost, room));
             }

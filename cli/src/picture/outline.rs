@@ -41,17 +41,14 @@ impl Outline {
         }
     }
 
-    /// Classes of the edge and of what is within it.
-    pub fn classes(&self) -> [String; 2] {
-        match self.colour.map(|k| k % COLOURS) {
-            Some(k) => [format!("c{k} k{k}"), format!("b{k}")],
-            None => ["fixed".into(), "fixed".into()],
+    /// Classes and widths of the strokes that draw the body. A bar is its edge and what is within it; what is behind an area
+    /// can be seen through it.
+    pub fn strokes(&self) -> Vec<(String, f64)> {
+        match (self.colour.map(|k| k % COLOURS), self.corners.len()) {
+            (Some(k), 2) => vec![(format!("n c{k}"), self.width + EDGE), (format!("b{k}"), self.width)],
+            (Some(k), _) => vec![(format!("glass b{k} c{k}"), THIN)],
+            (None, _) => vec![("fixed".into(), THIN)],
         }
-    }
-
-    /// Widths of both.
-    pub fn widths(&self) -> [f64; 2] {
-        [self.width + EDGE, self.width]
     }
 
     /// The path, with the commands of a path.
@@ -65,7 +62,7 @@ impl Outline {
     pub fn draw(&self, text: &mut String, joints: bool) {
         if self.corners.len() > 1 {
             let d = Outline::path(&self.corners);
-            for (class, width) in self.classes().iter().zip(self.widths()) {
+            for (class, width) in self.strokes() {
                 let _ = writeln!(text, "<path class=\"round {class}\" stroke-width=\"{width:.1}\" d=\"{d}\"/>");
             }
         }

@@ -1,6 +1,6 @@
 //! The shape of a mechanism: lines between the points at which its bodies are connected.
 
-use multibody::codegen::model::{ConstraintKind, LoopKind, Model, Mount, ShapeKind, Unit, Value};
+use multibody::codegen::model::{ConstraintKind, LoopKind, Model, Mount, Rotation, ShapeKind, Unit, Value};
 use multibody::codegen::plan::Plan;
 use multibody::runtime::sweep::FrameState;
 
@@ -60,6 +60,8 @@ pub struct Shapes {
     pub supports: Vec<[f64; 3]>,
     parts: Vec<Part>,
     rods: Vec<Rod>,
+    /// Places of the ground on which something rolls, m: horizontal floors.
+    pub floors: Vec<[f64; 3]>,
     /// Frame and name of the bodies that a picture may name, and the colour.
     pub named: Vec<(usize, String, usize)>,
 }
@@ -83,8 +85,10 @@ struct Known {
     tips: Vec<[f64; 3]>,
     /// Whether a weld holds it, whose place says nothing of its shape.
     welded: bool,
-    /// Whether contacts know its shape.
+    /// Whether contacts or loops know its shape.
     solid: bool,
+    /// Whether no joint holds it.
+    free: bool,
 }
 
 /// Greatest distance between two points.
@@ -133,12 +137,15 @@ impl Shapes {
         for shape in &model.shapes {
             let Some(b) = shape.mount.body else { continue };
             match shape.kind {
-                ShapeKind::Point | ShapeKind::Sphere { .. } => known[b].tips.push(shape.mount.placement.xyz.map(number)),
+                ShapeKind::Point | ShapeKind::Sphere { .. } => {
+                    known[b].tips.push(shape.mount.placement.xyz.map(number))
+                }
                 ShapeKind::Plane { .. } => {}
                 _ => known[b].solid = true,
             }
             known[b].solid |= matches!(shape.kind, ShapeKind::Sphere { .. }) && known[b].joints.is_empty();
         }
+        discs.iter().for_each(|disc| known[disc.0].solid = true);
         fleshed(model, &number, &known, &mut parts);
         for (b, centre, axis, radius) in discs {
             let rim = disc(centre, axis, radius);
@@ -151,7 +158,18 @@ impl Shapes {
         }
         let named = limbs::named(model, &number).into_iter();
         let named = named.filter_map(|b| Some((frame(b)?, model.bodies[b].name.clone(), colours[b]))).collect();
-        Shapes { supports, parts, rods, named }
+        let floors = model.constraints.iter().filter_map(|constraint| match &constraint.kind {
+            ConstraintKind::Loop {
+                kind: LoopKind::RollingDisc { .. } | LoopKind::RollingBall { .. } | LoopKind::RollingEllipsoid { .. },
+                first,
+                ..
+            } if first.body.is_none() && first.placement.rotation == Rotation::NONE => {
+                Some(first.placement.xyz.map(number))
+            }
+            _ => None,
+        });
+        let floors = floors.collect();
+        Shapes { supports, parts, rods, floors, named }
     }
 
     /// The mechanism at given poses of its frames.
@@ -196,6 +214,7 @@ fn joints(
         let (spec, slides) = (joint.kind.spec(), slides(joint));
         // A body that moves in a plane or in space is tied to no point.
         if slides && spec.group.is_some() {
+            known[joint.child].free = true;
             continue;
         }
         let at = joint.placement.xyz.map(number);
@@ -274,7 +293,16 @@ fn fleshed(model: &Model, number: &dyn Fn(Value) -> f64, known: &[Known], parts:
         let part = &mut parts[b];
         part.points.clone_from(&own[b]);
         if sizes[b] > 1e-6 * whole && sizes[b] > 0.0 {
-            part.radius = flesh::radius(mass, sizes[b]);
+            // What mass is in feet and solids is not in the limb; plates are thinner than bars.
+            let slim = match (known[b].solid || !known[b].tips.is_empty(), own[b].len() > 2) {
+                (false, false) => 1.0,
+                _ => 0.4,
+            };
+            part.radius = slim * flesh::radius(mass, sizes[b]);
+            // A free body with few joints is more than the line between them.
+            if own[b].len() < 3 && known[b].free && !known[b].solid {
+                part.points.extend(flesh::points(body, number, 0.75 * sizes[b]));
+            }
             continue;
         }
         if known[b].solid {
@@ -288,7 +316,8 @@ fn fleshed(model: &Model, number: &dyn Fn(Value) -> f64, known: &[Known], parts:
             false => (1.05 * away).max(0.6 * beside).max(1e-3 * whole),
         };
         part.points.extend(flesh::points(body, number, most));
-        part.radius = 0.2 * flesh::radius(mass, away);
+        let rod = part.points.len() < own[b].len() + 3;
+        part.radius = if rod { flesh::radius(mass, extent(&part.points)) } else { 0.2 * flesh::radius(mass, away) };
     }
 }
 

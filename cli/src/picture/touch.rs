@@ -9,6 +9,7 @@ use multibody::runtime::sweep::FrameState;
 use multibody::runtime::tree::Closure;
 use multibody::runtime::Interpreter;
 
+use super::limbs;
 use super::shapes::Line;
 use super::view::{Page, View};
 
@@ -33,7 +34,7 @@ struct Plane {
 struct Solid {
     frame: usize,
     points: Vec<[f64; 3]>,
-    body: Option<usize>,
+    colour: Option<usize>,
 }
 
 /// A place where two bodies can touch: geometry, frames, and directions of their z.
@@ -143,6 +144,11 @@ impl Touch {
         if model.shapes.is_empty() {
             return None;
         }
+        let params = plan.default_params();
+        let colours = limbs::colours(&plan.model, &|v| match v {
+            Value::Const(x) => x,
+            Value::Param(k) => params[k],
+        });
         let mut names = Vec::new();
         let mut add = |mount: &Mount| {
             // A control character is in no name of the model.
@@ -167,12 +173,11 @@ impl Touch {
                 ref kind => {
                     let points = surface(kind);
                     if !points.is_empty() {
-                        solids.push(Solid { frame, points, body: shape.mount.body });
+                        solids.push(Solid { frame, points, colour: shape.mount.body.map(|b| colours[b]) });
                     }
                 }
             }
         }
-        let params = plan.default_params();
         let mut places = Vec::new();
         for contact in &plan.model.contacts {
             places.push(match &contact.kind {
@@ -209,17 +214,10 @@ impl Touch {
 
     /// Solids on bodies (`ground` false) or on the ground.
     pub fn solids(&self, poses: &[FrameState<f64>], ground: bool) -> Vec<Line> {
-        let solids = self.solids.iter().filter(|s| s.body.is_none() == ground).map(|solid| {
+        let solids = self.solids.iter().filter(|s| s.colour.is_none() == ground).map(|solid| {
             let at = &poses[solid.frame];
             let points = solid.points.iter().map(|p| plus(at.position, rotated(&at.rotation, *p))).collect();
-            Line {
-                points,
-                closed: false,
-                flat: ROUND,
-                marks: Vec::new(),
-                colour: solid.body,
-                radius: 0.0,
-            }
+            Line { points, closed: false, flat: ROUND, marks: Vec::new(), colour: solid.colour, radius: 0.0 }
         });
         let faces = self.planes.iter().filter(|_| !ground).filter_map(|plane| {
             let (at, half) = (&poses[plane.frame], 0.5 * plane.patch?);
@@ -322,10 +320,10 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// The scale with which the largest of some forces has a good length; `None` where there are none.
-    pub fn new<'a>(arrows: impl Iterator<Item = &'a Arrow>, page: &Page) -> Option<Scale> {
+    /// The scale with which the largest of some forces has a good length; `None` where all are at most `least`, N.
+    pub fn new<'a>(arrows: impl Iterator<Item = &'a Arrow>, page: &Page, least: f64) -> Option<Scale> {
         let largest = arrows.map(|(_, f)| norm(*f)).filter(|f| f.is_finite()).fold(0.0, f64::max);
-        (largest > 0.0).then(|| Scale { metres: LONGEST * page.size() / largest, largest })
+        (largest > least).then(|| Scale { metres: LONGEST * page.size() / largest, largest })
     }
 
     /// Both ends on the page of an arrow that starts where the force acts; the same place twice for a small force.

@@ -20,6 +20,9 @@ fn unit(a: [f64; 3]) -> [f64; 3] {
     a.map(|x| x / norm)
 }
 
+/// Direction to the eye where the mechanism does not move in a plane.
+pub const OBLIQUE: [f64; 3] = [0.5, -1.0, 0.45];
+
 impl View {
     /// The projection along a direction; if none is given, along the normal of the plane in which all points lie.
     pub fn new(direction: Option<[f64; 3]>, points: &[[f64; 3]]) -> View {
@@ -30,7 +33,7 @@ impl View {
         let flat = 1e-6 * extent.iter().fold(0.0, |m: f64, x| m.max(*x));
         let planes = [(1, [0.0, -1.0, 0.0]), (0, [1.0, 0.0, 0.0]), (2, [0.0, 0.0, 1.0])];
         let across = planes.into_iter().find(|(k, _)| extent[*k] <= flat).map(|(_, direction)| direction);
-        let eye = unit(direction.or(across).unwrap_or([0.5, -1.0, 0.45]));
+        let eye = unit(direction.or(across).unwrap_or(OBLIQUE));
         let above = if eye[2].abs() > 0.999 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
         let right = unit(cross(above, eye));
         View { right, up: cross(eye, right), eye }

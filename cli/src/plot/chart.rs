@@ -93,8 +93,8 @@ impl Chart {
     }
 
     /// Patterns of dashes for curves over the same `x`: a curve that is on an earlier one over much of its length gets
-    /// another pattern, so that both are seen. With it the earlier curve, where they are together everywhere.
-    pub fn dashes(&self, x: &[f64], curves: &[&[f64]]) -> Vec<(usize, Option<usize>)> {
+    /// another pattern, so that both are seen.
+    pub fn dashes(&self, x: &[f64], curves: &[&[f64]]) -> Vec<usize> {
         let stride = x.len().div_ceil(COMPARED).max(1);
         let places = |curve: &[f64]| -> Vec<f64> {
             let all = x.iter().zip(curve).step_by(stride);
@@ -105,12 +105,11 @@ impl Chart {
             let near = a.iter().zip(b).filter(|(a, b)| (*a - *b).abs() < SAME).count();
             near as f64 / a.len().min(b.len()).max(1) as f64
         };
-        let mut found: Vec<(usize, Option<usize>)> = Vec::new();
+        let mut found: Vec<usize> = Vec::new();
         for (k, place) in places.iter().enumerate() {
-            let shares: Vec<f64> = places[..k].iter().map(|earlier| together(earlier, place)).collect();
-            let on = (0..k).filter(|j| shares[*j] > OFTEN);
-            let dash = on.map(|j| found[j].0 + 1).max().unwrap_or(0);
-            found.push((dash, (0..k).find(|j| shares[*j] >= 1.0)));
+            let on = (0..k).filter(|j| together(&places[*j], place) > OFTEN);
+            let dash = on.map(|j| found[j] + 1).max().unwrap_or(0);
+            found.push(dash);
         }
         found
     }
@@ -156,7 +155,11 @@ fn simplified(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
         let length = dx.hypot(dy);
         let distance = |k: usize| {
             let [a, b] = [points[k][0] - x, points[k][1] - y];
-            if length > 0.0 { (a * dy - b * dx).abs() / length } else { a.hypot(b) }
+            if length > 0.0 {
+                (a * dy - b * dx).abs() / length
+            } else {
+                a.hypot(b)
+            }
         };
         let farthest = (from + 1..to).max_by(|a, b| distance(*a).total_cmp(&distance(*b)));
         if let Some(k) = farthest.filter(|k| distance(*k) > FLAT) {

@@ -75,7 +75,11 @@ pub fn svg_over(title: &str, x: &str, panels: &[Panel]) -> String {
     let mut body = String::new();
     let size = 15.0_f64.min(15.0 * (WIDTH - 2.0 * EDGE) / ink::width(title, 15.0).max(1.0)).max(9.0);
     let shown = shortened(title, size, WIDTH - 2.0 * EDGE);
-    let _ = writeln!(body, "<text class=\"head\" style=\"font-size:{size:.1}px\" x=\"{EDGE}\" y=\"26\">{}</text>", escaped(&shown));
+    let _ = writeln!(
+        body,
+        "<text class=\"head\" style=\"font-size:{size:.1}px\" x=\"{EDGE}\" y=\"26\">{}</text>",
+        escaped(&shown)
+    );
     let mut y = 40.0;
     for panel in panels {
         y += match &panel.note {
@@ -111,7 +115,6 @@ fn words(text: &mut String, panel: &Panel, note: &str, y: f64) -> f64 {
 
 /// A panel with one chart, and the names at the ends of its curves; returns its height.
 fn draw(text: &mut String, panel: &Panel, x: &str, y: f64) -> f64 {
-    heading(text, &panel.label, "", y);
     let named = panel.lines.iter().filter(|l| !l.0.is_empty()).count().min(COLOURS * DASHES);
     let height = CHART.max(ROW * named as f64);
     let values = panel.lines.iter().flat_map(|l| &l.1).copied();
@@ -125,8 +128,10 @@ fn draw(text: &mut String, panel: &Panel, x: &str, y: f64) -> f64 {
     chart.frame(text, [true, true]);
     let curves: Vec<&[f64]> = panel.lines.iter().map(|l| l.1.as_slice()).collect();
     let dashes = chart.dashes(&panel.t, &curves);
+    let hint = if dashes.iter().any(|d| *d > 0) { "dashed where a curve lies on another" } else { "" };
+    heading(text, &panel.label, hint, y);
     for (k, (name, values)) in panel.lines.iter().enumerate() {
-        chart.curve(text, (&panel.t, values), &class(k, dashes[k].0), name);
+        chart.curve(text, (&panel.t, values), &class(k, dashes[k]), name);
     }
     names(text, &chart, panel, &dashes);
     let middle = chart.corner[0] + 0.5 * chart.size[0];
@@ -135,7 +140,7 @@ fn draw(text: &mut String, panel: &Panel, x: &str, y: f64) -> f64 {
 }
 
 /// Names at the ends of curves, moved apart, with the colour and dashes of the curve.
-fn names(text: &mut String, chart: &Chart, panel: &Panel, dashes: &[(usize, Option<usize>)]) {
+fn names(text: &mut String, chart: &Chart, panel: &Panel, dashes: &[usize]) {
     let (top, bottom) = (chart.corner[1], chart.corner[1] + chart.size[1]);
     let right = chart.corner[0] + chart.size[0];
     let mut ends: Vec<(f64, usize)> = Vec::new();
@@ -149,20 +154,17 @@ fn names(text: &mut String, chart: &Chart, panel: &Panel, dashes: &[(usize, Opti
     let mut places: Vec<f64> = ends.iter().map(|e| e.0).collect();
     spread(&mut places, ROW, [top + 4.0, bottom - 4.0]);
     for ((end, k), y) in ends.iter().zip(places) {
-        let (full, (dash, same)) = (&panel.lines[*k].0, dashes[*k]);
-        let name = match same {
-            Some(j) => format!("{full} (on {})", panel.lines[j].0),
-            None => full.clone(),
-        };
-        let (colour, short) = (k % COLOURS, escaped(&shortened(&name, 11.0, NAMES - 58.0)));
+        let (name, dash) = (&panel.lines[*k].0, dashes[*k]);
+        let (colour, short) = (k % COLOURS, escaped(&shortened(name, 11.0, NAMES - 58.0)));
         let [a, b, c, d] = [2.0, 12.0, 36.0, 41.0].map(|dx| right + dx);
-        let _ = writeln!(text, "<path class=\"n c{colour}\" stroke-opacity=\".55\" d=\"M{a:.1} {end:.1}L{b:.1} {y:.1}\"/>");
+        let _ =
+            writeln!(text, "<path class=\"n c{colour}\" stroke-opacity=\".55\" d=\"M{a:.1} {end:.1}L{b:.1} {y:.1}\"/>");
         let _ = writeln!(text, "<path class=\"curve {}\" d=\"M{b:.1} {y:.1}H{c:.1}\"/>", class(*k, dash));
         let _ = writeln!(
             text,
             "<text class=\"small\" x=\"{d:.1}\" y=\"{:.1}\"><title>{}</title>{short}</text>",
             y + 4.0,
-            escaped(&name)
+            escaped(name)
         );
     }
 }

@@ -39,14 +39,15 @@ pub fn draw(text: &mut String, panel: &Panel, x: &str, y: f64) -> f64 {
     lengths.sort_by(f64::total_cmp);
     let shared = lengths[lengths.len() / 2] >= ALIKE * lengths[lengths.len() - 1];
     let whole = range(ranges.iter().flatten().copied()).unwrap_or([0.0, 1.0]);
-    let mut more = String::from(if shared { "the same scale in all charts" } else { "every chart has a scale of its own" });
+    let mut more =
+        String::from(if shared { "the same scale in all charts" } else { "every chart has a scale of its own" });
     if all > MOST {
         let _ = write!(more, "; {MOST} of {all}, evenly chosen, the others are in the table");
     }
     heading(text, &panel.label, &more, y);
     let n = columns(shown.len());
     // Scales of their own have their numbers at every chart.
-    let gap = if shared { 14.0 } else { 52.0 };
+    let gap = if shared { 22.0 } else { 52.0 };
     let first = EDGE + if shared { NUMBERS - 14.0 } else { 50.0 };
     let width = (WIDTH - first - EDGE - gap * (n - 1) as f64) / n as f64;
     let row = NAME + CHART + BETWEEN;

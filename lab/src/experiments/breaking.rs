@@ -127,16 +127,21 @@ fn motion(chain: &Breaking, args: &BreakingArgs, out: &mut dyn Write) -> Outcome
     write_file(&path, &picture(&shapes))?;
     writeln!(out, "figure: {}", path.display())?;
     let line = |name: &str, value: &dyn Fn(&Moment) -> f64| (name.to_string(), moments.iter().map(value).collect());
-    let energies = Panel::new("energy [J]", moments.iter().map(|m| m.t).collect(), vec![
+    let energies = Panel::new(
+        "energy [J]",
+        moments.iter().map(|m| m.t).collect(),
+        vec![
             line("links 1 to 40", &|m| m.parts[0].total()),
             line("links 41 to 100", &|m| m.parts[1].total()),
             line("taken by friction", &|m| m.friction),
             line("sum", &Moment::sum),
-        ]);
-    let kinetic = Panel::new("kinetic energy [J]", energies.t.clone(), vec![
-            line("links 1 to 40", &|m| m.parts[0].energy[0]),
-            line("links 41 to 100", &|m| m.parts[1].energy[0]),
-        ]);
+        ],
+    );
+    let kinetic = Panel::new(
+        "kinetic energy [J]",
+        energies.t.clone(),
+        vec![line("links 1 to 40", &|m| m.parts[0].energy[0]), line("links 41 to 100", &|m| m.parts[1].energy[0])],
+    );
     figure(out, folder, "breaking_energy", "Energy of a breaking chain", "time [s]", &[energies, kinetic])
 }
 
