@@ -76,7 +76,7 @@ fn rules(inks: &Inks) -> String {
     let mut css = format!(
         "text{{fill:{text}}}.m{{fill:{muted}}}.paper{{fill:{paper}}}.halo{{stroke:{paper};fill:{paper}}}.grid{{stroke:{grid}}}\
          .axis{{stroke:{muted}}}.floor{{fill:{floor};stroke:{muted}}}.pin{{fill:{paper};stroke:{text}}}\
-         .force{{stroke:{force};fill:{force}}}.ink{{stroke:{text};fill:{text}}}.fixed{{stroke:{muted};fill:{grid}}}"
+         .force{{stroke:{force};fill:{force}}}.ink{{stroke:{text};fill:{text}}}.fixed{{stroke:{muted};fill:{grid}}}.plate{{stroke:{grid};fill:{grid}}}"
     );
     for (k, line) in lines.iter().enumerate() {
         let tinted = mixed(line, paper, *tint);

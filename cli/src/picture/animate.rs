@@ -173,7 +173,7 @@ fn moving_part(text: &mut String, clock: &Clock, part: usize, mut outlines: Vec<
 /// Gives the outlines of all instants the same number of corners, those of one instant beside those of the next.
 fn matched(outlines: &mut [Outline]) {
     let count = outlines[0].corners.len();
-    if count > CORNERS || count < 2 || outlines.iter().any(|o| o.corners.len() != count) {
+    if !(2..=CORNERS).contains(&count) || outlines.iter().any(|o| o.corners.len() != count) {
         outlines.iter_mut().for_each(|o| o.corners = supported(&o.corners));
         return;
     }

@@ -21,6 +21,17 @@ fn moves(model: &Model) -> Vec<bool> {
     moves
 }
 
+/// Whether each body is welded to the ground.
+pub fn grounded(model: &Model) -> Vec<bool> {
+    let moves = moves(model);
+    let mut grounded = vec![false; model.bodies.len()];
+    // Joints are depth first, so that parents come before children.
+    for joint in &model.joints {
+        grounded[joint.child] = !moves[joint.child] && joint.parent.is_none_or(|p| grounded[p]);
+    }
+    grounded
+}
+
 /// Limb of each body: what follows a body without branching. Welded bodies belong to the limb of the body that holds them.
 fn limbs(model: &Model) -> Vec<usize> {
     let (parents, moves) = (parents(model), moves(model));

@@ -47,6 +47,7 @@ impl Outline {
         match (self.colour.map(|k| k % COLOURS), self.corners.len()) {
             (Some(k), 2) => vec![(format!("n c{k}"), self.width + EDGE), (format!("b{k}"), self.width)],
             (Some(k), _) => vec![(format!("glass b{k} c{k}"), THIN)],
+            (None, 2) => vec![("n fixed".into(), self.width + EDGE), ("plate".into(), self.width)],
             (None, _) => vec![("fixed".into(), THIN)],
         }
     }

@@ -42,7 +42,7 @@ struct Part {
     points: Vec<[f64; 3]>,
     marks: Vec<([f64; 3], bool)>,
     closed: bool,
-    colour: usize,
+    colour: Option<usize>,
     radius: f64,
 }
 
@@ -108,12 +108,13 @@ impl Shapes {
         let model = &plan.model;
         let frame = |b: usize| plan.frames.iter().position(|f| f.name == model.bodies[b].name);
         let colours = limbs::colours(model, &number);
+        let grounded = limbs::grounded(model);
         let part = |b: usize| Part {
             frame: frame(b),
             points: Vec::new(),
             marks: Vec::new(),
             closed: false,
-            colour: colours[b],
+            colour: (!grounded[b]).then_some(colours[b]),
             radius: 0.0,
         };
         let mut parts: Vec<Part> = (0..model.bodies.len()).map(part).collect();
@@ -303,17 +304,21 @@ fn fleshed(model: &Model, number: &dyn Fn(Value) -> f64, known: &[Known], parts:
             if own[b].len() < 3 && known[b].free && !known[b].solid {
                 part.points.extend(flesh::points(body, number, 0.75 * sizes[b]));
             }
+            // Neither is the trunk of a tree. In loops, plates are what is between their joints.
+            if own[b].len() > 2 && model.constraints.is_empty() && !known[b].solid {
+                part.points.extend(flesh::points(body, number, 0.5 * sizes[b]));
+            }
             continue;
         }
         if known[b].solid {
             continue;
         }
-        // No larger than its neighbours let it be: about twice the way to its centre of mass, or as the body that holds it.
+        // No larger than its neighbours let it be: about twice the way to its centre of mass, or a part of the body that holds it.
         let away = own[b].first().map_or(0.0, |p| extent(&[*p, com]));
         let beside = parent(b).map_or(0.0, |p| sizes[p]);
         let most = match own[b].is_empty() && !known[b].welded {
             true => f64::MAX.sqrt(),
-            false => (1.05 * away).max(0.6 * beside).max(1e-3 * whole),
+            false => (1.05 * away).max(0.35 * beside).max(1e-3 * whole),
         };
         part.points.extend(flesh::points(body, number, most));
         let rod = part.points.len() < own[b].len() + 3;
@@ -353,7 +358,7 @@ fn line(part: &Part, frames: &[FrameState<f64>]) -> Line {
         closed: part.closed,
         flat: BARS,
         marks: part.marks.iter().map(|(p, slides)| (at(p), *slides)).collect(),
-        colour: Some(part.colour),
+        colour: part.colour,
         radius: part.radius,
     }
 }
