@@ -19,7 +19,7 @@ const CLOSED: f64 = 0.02;
 /// Part of the time for which the last instant is held of a motion that does not come back.
 const HELD: f64 = 0.15;
 /// Corners of an outline whose number of corners changes.
-const CORNERS: usize = 20;
+const CORNERS: usize = 24;
 
 /// How many times slower than in truth a motion of `time` s is shown.
 fn slower(time: f64) -> f64 {

@@ -31,7 +31,7 @@ impl Outline {
             (false, _) => Vec::new(),
             (true, true) => points,
             // Round ones have many points.
-            (true, false) => hull(&points, (if points.len() > 20 { 4e-4 } else { line.flat }) * page.size()),
+            (true, false) => hull(&points, (if points.len() > 20 { 1.2e-4 } else { line.flat }) * page.size()),
         };
         Outline {
             corners: corners.iter().map(|p| page.place(*p)).collect(),
