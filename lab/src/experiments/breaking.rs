@@ -14,6 +14,7 @@ use super::tables::{head, row};
 use super::{directory, figure, thesis};
 use crate::args::experiments::BreakingArgs;
 use crate::scenes::breaking::{Breaking, Part, State, BREAK, END, LENGTH, LINK, LINKS, STEP};
+use mbd_cli::ink;
 use mbd_cli::plot::Panel;
 use mbd_cli::{note, write_file, Failure, Outcome};
 
@@ -311,17 +312,14 @@ fn picture(shapes: &[Shape]) -> String {
     }
     let place = |[x, y]: [f64; 2]| [EDGE + SCALE * (x - low[0]), EDGE + SCALE * (high[1] - y)];
     let [width, height] = place([high[0], low[1]]).map(|x| x + EDGE);
-    let mut text = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
-         viewBox=\"0 0 {width:.0} {height:.0}\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
-    );
+    let mut text = ink::head([width, height], "The chain at equal times; the free part has another colour");
     for (k, shape) in shapes.iter().enumerate() {
-        let light = 80.0 - 50.0 * k as f64 / shapes.len().max(1) as f64;
-        for (line, hue) in shape.lines.iter().zip([220, 10]) {
+        let opacity = 0.3 + 0.7 * (k + 1) as f64 / shapes.len() as f64;
+        for (line, class) in shape.lines.iter().zip(["c0", "c5"]) {
             let points: Vec<String> = line.iter().map(|p| place(*p)).map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
             let _ = writeln!(
                 text,
-                "<polyline points=\"{}\" fill=\"none\" stroke=\"hsl({hue}, 70%, {light:.0}%)\" stroke-width=\"1.5\"/>",
+                "<polyline points=\"{}\" class=\"curve {class}\" stroke-opacity=\"{opacity:.2}\"/>",
                 points.join(" ")
             );
         }
