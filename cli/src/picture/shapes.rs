@@ -130,22 +130,7 @@ impl Shapes {
                 rods.push(Rod { ends, colour: colours[b], pins: false });
             }
         }
-        for frame in &model.frames {
-            if let Some(b) = frame.body {
-                known[b].frames.push(frame.placement.xyz.map(number));
-            }
-        }
-        for shape in &model.shapes {
-            let Some(b) = shape.mount.body else { continue };
-            match shape.kind {
-                ShapeKind::Point | ShapeKind::Sphere { .. } => {
-                    known[b].tips.push(shape.mount.placement.xyz.map(number))
-                }
-                ShapeKind::Plane { .. } => {}
-                _ => known[b].solid = true,
-            }
-            known[b].solid |= matches!(shape.kind, ShapeKind::Sphere { .. }) && known[b].joints.is_empty();
-        }
+        tips(model, &number, &mut known);
         discs.iter().for_each(|disc| known[disc.0].solid = true);
         fleshed(model, &number, &known, &mut parts);
         for (b, centre, axis, radius) in discs {
@@ -159,17 +144,7 @@ impl Shapes {
         }
         let named = limbs::named(model, &number).into_iter();
         let named = named.filter_map(|b| Some((frame(b)?, model.bodies[b].name.clone(), colours[b]))).collect();
-        let floors = model.constraints.iter().filter_map(|constraint| match &constraint.kind {
-            ConstraintKind::Loop {
-                kind: LoopKind::RollingDisc { .. } | LoopKind::RollingBall { .. } | LoopKind::RollingEllipsoid { .. },
-                first,
-                ..
-            } if first.body.is_none() && first.placement.rotation == Rotation::NONE => {
-                Some(first.placement.xyz.map(number))
-            }
-            _ => None,
-        });
-        let floors = floors.collect();
+        let floors = floors(model, &number);
         Shapes { supports, parts, rods, floors, named }
     }
 
@@ -196,6 +171,39 @@ impl Shapes {
         points.extend(self.lines(frames).into_iter().flat_map(|l| l.points));
         points
     }
+}
+
+/// Adds frames, feet and solids to what is known of the bodies.
+fn tips(model: &Model, number: &dyn Fn(Value) -> f64, known: &mut [Known]) {
+    for frame in &model.frames {
+        if let Some(b) = frame.body {
+            known[b].frames.push(frame.placement.xyz.map(number));
+        }
+    }
+    for shape in &model.shapes {
+        let Some(b) = shape.mount.body else { continue };
+        match shape.kind {
+            ShapeKind::Point | ShapeKind::Sphere { .. } => known[b].tips.push(shape.mount.placement.xyz.map(number)),
+            ShapeKind::Plane { .. } => {}
+            _ => known[b].solid = true,
+        }
+        known[b].solid |= matches!(shape.kind, ShapeKind::Sphere { .. }) && known[b].joints.is_empty();
+    }
+}
+
+/// Places of the ground on which something rolls.
+fn floors(model: &Model, number: &dyn Fn(Value) -> f64) -> Vec<[f64; 3]> {
+    let floors = model.constraints.iter().filter_map(|constraint| match &constraint.kind {
+        ConstraintKind::Loop {
+            kind: LoopKind::RollingDisc { .. } | LoopKind::RollingBall { .. } | LoopKind::RollingEllipsoid { .. },
+            first,
+            ..
+        } if first.body.is_none() && first.placement.rotation == Rotation::NONE => {
+            Some(first.placement.xyz.map(number))
+        }
+        _ => None,
+    });
+    floors.collect()
 }
 
 /// Whether the first freedom of a joint is a translation.
