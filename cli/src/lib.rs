@@ -21,6 +21,7 @@ mod explain;
 mod fmu;
 mod generate;
 mod identifiable;
+pub mod ink;
 mod interrupt;
 mod loops;
 mod modes;

@@ -401,6 +401,24 @@ pub struct SimulateArgs {
     /// Number of instants that are drawn
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub strobes: u16,
+    /// Let the picture move: the motion in a loop, slowed down or sped up as the caption says, without a script. Readers who
+    /// prefer reduced motion see the still picture
+    #[arg(long, requires = "picture")]
+    pub animate: bool,
+    /// Names in the picture
+    #[arg(long, value_enum, value_name = "WHICH", default_value_t = Names::Auto, requires = "picture")]
+    pub names: Names,
+}
+
+/// What a picture names. A mechanism of many bodies has one colour for each limb, whose last body is named.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Names {
+    /// The bodies, or the last ones of all limbs, where there are at most nine
+    Auto,
+    /// The same, where there are at most twelve
+    All,
+    /// Nothing
+    None,
 }
 
 /// A motion: the model, its start, and how it is computed.

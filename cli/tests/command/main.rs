@@ -6,6 +6,7 @@ mod commands;
 mod contacts;
 mod control;
 mod documented;
+mod drawings;
 mod eval;
 mod loops;
 mod parquet;
