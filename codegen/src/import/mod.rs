@@ -1,10 +1,15 @@
 //! Readers of file formats: text to [`raw::RawModel`]. Nothing outside this module knows the formats.
 
+mod floor;
+pub mod mjcf;
 pub mod raw;
 pub mod source;
+mod taken;
+mod tally;
 pub mod toml;
 pub mod urdf;
 pub mod words;
+mod xml;
 
 use crate::choice::choice;
 
@@ -33,7 +38,34 @@ pub struct ImportOptions {
     pub floor: Option<Floor>,
 }
 
-/// How the file that a description names as its base is read.
+/// The formats of XML files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum XmlFormat {
+    /// Robots of links and joints.
+    Urdf,
+    /// Models of MuJoCo.
+    Mjcf,
+}
+
+impl XmlFormat {
+    /// The format by the outermost element; `None` where it is another one.
+    pub fn of(text: &str) -> Option<XmlFormat> {
+        let mut rest = text.trim_start_matches('\u{feff}').trim_start();
+        // Declarations and comments may stand before it.
+        while let Some((start, end)) =
+            [("<?", "?>"), ("<!--", "-->"), ("<!", ">")].iter().find(|p| rest.starts_with(p.0))
+        {
+            rest = rest[start.len()..].split_once(end).map_or("", |(_, rest)| rest.trim_start());
+        }
+        match rest {
+            _ if rest.starts_with("<mujoco") => Some(XmlFormat::Mjcf),
+            _ if rest.starts_with("<robot") || text.contains("<robot") => Some(XmlFormat::Urdf),
+            _ => None,
+        }
+    }
+}
+
+/// How the files that a description names, as its base or to include them, are read.
 pub type ReadFile<'f> = &'f dyn Fn(&std::path::Path) -> std::io::Result<String>;
 
 /// A floor across z of the ground.
