@@ -15,7 +15,7 @@ fn files(folder: &Path, all: &mut Vec<PathBuf>) {
         let path = entry.expect("an entry").path();
         match path.extension().and_then(|e| e.to_str()) {
             _ if path.is_dir() => files(&path, all),
-            Some("toml" | "urdf") => all.push(path),
+            Some("toml" | "urdf" | "xml") => all.push(path),
             _ => {}
         }
     }

@@ -40,6 +40,8 @@ pub(super) struct Known {
     pub kind: Kind,
     /// Coordinate of the body as the file places it.
     pub reference: f64,
+    /// Coordinate at which springs are relaxed.
+    pub rest: f64,
     /// Index among the joints of the raw model.
     pub index: usize,
 }
@@ -181,20 +183,32 @@ impl<'d> Built<'d> {
                 // Any point slides alike: one that needs no displacement.
                 Kind::Slide if n == 0 => [0.0; 3],
                 Kind::Slide => pending.inverse().xyz,
+                Kind::Free => [0.0; 3],
                 _ => joint.anchor,
             };
             let placement = if free { Pose::IDENTITY } else { pending.then(&joint.before(anchor)) };
-            pending = if free { Pose::IDENTITY } else { Pose::translation(anchor.map(|x| -x)) };
+            pending = Pose::translation(anchor.map(|x| -x));
+            let last = n + 1 == body.joints.len() && pending.xyz == [0.0; 3];
             let name = name.clone().unwrap_or_else(|| {
                 let wanted = format!("{}_{}", self.names[k].value, joint.kind.word());
                 Spanned::new(self.joint_names.name(&wanted, "_"), place(part.element.node))
             });
-            let last = n + 1 == body.joints.len() && pending.xyz == [0.0; 3];
-            let child = if last { self.names[k].clone() } else { self.between(k, &name, raw) };
-            let raw_joint = self.joint(part, &joint, name, child.clone(), body, rules, raw.joints.len());
-            let placement = placement.raw(place(part.element.node));
-            raw.joints.push(RawJoint { parent: carrier, placement, ..raw_joint });
-            carrier = Some(child);
+            self.know(part, &joint, &name.value, raw.joints.len());
+            let mut placement = placement.raw(place(part.element.node));
+            for (end, joint, start) in joint.elements(&body.pose) {
+                let name = match end {
+                    "" => name.clone(),
+                    end => Spanned::new(self.joint_names.name(&format!("{}{end}", name.value), "_"), name.span),
+                };
+                let child = if last && end.is_empty() { self.names[k].clone() } else { self.between(k, &name, raw) };
+                let placement = std::mem::take(&mut placement);
+                raw.joints.push(RawJoint {
+                    parent: carrier,
+                    placement,
+                    ..joint.raw(name, child.clone(), &start, rules)
+                });
+                carrier = Some(child);
+            }
         }
         if carrier.as_ref().is_none_or(|carrier| carrier.value != self.names[k].value) {
             let span = place(body.node);
@@ -231,22 +245,11 @@ impl<'d> Built<'d> {
         name
     }
 
-    #[allow(clippy::too_many_arguments)]
-    fn joint(
-        &mut self,
-        part: &Part<'d>,
-        joint: &Joint,
-        name: Spanned<String>,
-        child: Spanned<String>,
-        body: &Body,
-        rules: Rules,
-        index: usize,
-    ) -> RawJoint {
-        if let Some(given) = part.element.name() {
-            let known = Known { name: name.value.clone(), kind: joint.kind, reference: joint.reference, index };
-            self.joints.insert(given.value, known);
-        }
-        joint.raw(name, child, &body.pose, rules)
+    /// Notes a joint for what refers to it.
+    fn know(&mut self, part: &Part<'d>, joint: &Joint, name: &str, index: usize) {
+        let Some(given) = part.element.name() else { return };
+        let Joint { kind, reference, rest, .. } = *joint;
+        self.joints.insert(given.value, Known { name: name.to_string(), kind, reference, rest, index });
     }
 
     /// Adds the frame of a site.

@@ -103,6 +103,9 @@ pub(super) fn read(reader: &mut Reader, part: &Part, compiler: &Compiler, whose:
     let group = number(reader, "group", 0.0);
     let mesh = element.attribute("mesh").is_some() || kind == "mesh" || kind == "sdf";
     let ends = between(reader, element, whose);
+    if ends.is_none() && element.attribute("fromto").is_some() {
+        return None;
+    }
     let own = match &ends {
         Some((pose, _)) => *pose,
         None => pose(reader, element, compiler, whose),

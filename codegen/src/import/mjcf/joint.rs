@@ -9,6 +9,7 @@ use crate::import::raw::{RawFreedoms, RawJoint, RawLimits, RawNumber};
 use crate::import::source::{Span, Spanned};
 use crate::import::xml::{place, Reader};
 use crate::model::{JointSpec, FLOATING, PRISMATIC, REVOLUTE, SPHERICAL};
+use roxmltree::Node;
 
 /// The types of joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,7 +59,8 @@ pub(super) struct Joint {
     pub reference: f64,
     damping: f64,
     stiffness: f64,
-    rest: f64,
+    /// Coordinate at which the spring is relaxed, rad or m.
+    pub rest: f64,
     armature: f64,
     range: Option<Spanned<[f64; 2]>>,
     max_effort: Option<f64>,
@@ -161,9 +163,8 @@ fn align(reader: &mut Reader, element: &Element, kind: Kind, compiler: &Compiler
         _ => compiler.align_free,
     };
     // A body that carries others keeps its frame.
-    let body = element.node.parent_element();
-    let alone = body.is_none_or(|body| !body.descendants().skip(1).any(|n| n.has_tag_name("body")));
-    if kind == Kind::Free && aligned && alone {
+    let carries = |node: Node| node.descendants().skip(1).any(|n| n.has_tag_name("body"));
+    if kind == Kind::Free && aligned && !element.node.parent_element().is_some_and(carries) {
         let message = format!("{whose}a free joint that is aligned with the principal axes is not read");
         let help = "write `align=\"false\"`: the motion is the same, with the coordinates of the body's own frame";
         reader.findings.error(stated.map_or(place(element.node), |word| word.span), message, help);
@@ -242,8 +243,38 @@ impl Joint {
         Pose::translation(anchor).then(&back)
     }
 
-    /// The joint with everything but its ends and its placement; `pose` is that of the body in the file.
-    pub fn raw(&self, name: Spanned<String>, child: Spanned<String>, pose: &Pose, rules: Rules) -> RawJoint {
+    /// The coordinates of a body that stands in the world as `pose` says; none where all are neutral.
+    fn start(&self, pose: &Pose) -> Vec<f64> {
+        let ([x, y, z], [w, a, b, c]) = (pose.xyz, pose.quat);
+        match self.kind {
+            Kind::Free if *pose != Pose::IDENTITY => vec![x, y, z, a, b, c, w],
+            Kind::Hinge | Kind::Slide if self.reference != 0.0 => vec![self.reference],
+            _ => Vec::new(),
+        }
+    }
+
+    /// The joints that it becomes, with what their names end in and their first coordinates; `pose` is that of the body
+    /// in the file. MuJoCo's rotors of a free joint resist its velocity in the axes of the world, which those of a
+    /// floating joint do not: with rotors it is three slides and a ball, whose coordinates and velocities are the same.
+    pub fn elements(self, pose: &Pose) -> Vec<(&'static str, Joint, Vec<f64>)> {
+        let start = self.start(pose);
+        if self.kind != Kind::Free || self.armature == 0.0 {
+            return vec![("", self, start)];
+        }
+        let axes = [("_x", [1.0, 0.0, 0.0]), ("_y", [0.0, 1.0, 0.0]), ("_z", [0.0, 0.0, 1.0])];
+        let slides = axes.into_iter().enumerate().map(|(k, (end, axis))| {
+            let axis = Spanned::new(axis, self.span);
+            let start = start.get(k).map(|x| vec![*x]).unwrap_or_default();
+            (end, Joint { kind: Kind::Slide, axis, range: None, ..self }, start)
+        });
+        let turned = start.get(3..).map(<[f64]>::to_vec).unwrap_or_default();
+        let mut all: Vec<_> = slides.collect();
+        all.push(("", Joint { kind: Kind::Ball, axis: self.axis.clone(), range: None, ..self }, turned));
+        all
+    }
+
+    /// The joint with everything but its ends and its placement.
+    pub fn raw(&self, name: Spanned<String>, child: Spanned<String>, start: &[f64], rules: Rules) -> RawJoint {
         let number = |x: f64| RawNumber::constant(x, self.span);
         let some = |x: f64| (x != 0.0).then(|| RawFreedoms::All(number(x)));
         let mut joint = RawJoint::new(name, Some(Spanned::new(self.kind.spec(), self.span)), Some(child));
@@ -259,14 +290,8 @@ impl Joint {
             joint.limits = (rules.stops && rules.options.on("limit")).then(|| limits.clone());
             joint.range = Some(limits);
         }
-        joint.start = match self.kind {
-            Kind::Free if *pose != Pose::IDENTITY => {
-                let ([x, y, z], [w, a, b, c]) = (pose.xyz, pose.quat);
-                let all = [x, y, z, a, b, c, w].map(number).to_vec();
-                Some(RawFreedoms::Each(Spanned::new(all, self.span)))
-            }
-            _ => some(self.reference),
-        };
+        let start: Vec<RawNumber> = start.iter().map(|x| number(*x)).collect();
+        joint.start = (!start.is_empty()).then(|| RawFreedoms::Each(Spanned::new(start, self.span)));
         joint
     }
 }

@@ -8,7 +8,7 @@ use super::element::{attribute, limited, number, numbers, Element};
 use super::equality::scalar;
 use super::joint::Rules;
 use crate::diag::Severity;
-use crate::import::raw::{RawFreedoms, RawModel, RawNumber, RawValue};
+use crate::import::raw::{RawFreedoms, RawJoint, RawModel, RawNumber, RawValue};
 use crate::import::source::Spanned;
 use crate::import::words::quote;
 use crate::import::xml::{place, Reader};
@@ -19,8 +19,8 @@ use roxmltree::Node;
 pub(super) struct Tendon {
     /// Name of each joint, its reference coordinate and its coefficient; none for spatial tendons.
     pub terms: Vec<(String, f64, f64)>,
-    /// Joint of the only term among those of the raw model.
-    only: Option<usize>,
+    /// Joint of the only term among those of the raw model, and the coordinate at which its springs are relaxed.
+    only: Option<(usize, f64)>,
 }
 
 const ATTRIBUTES: &[&str] = &[
@@ -90,7 +90,7 @@ fn fixed(reader: &mut Reader, node: Node, built: &Built, whose: &str) -> Option<
         };
         scalar(reader, known, &name, whose)?;
         let ratio = number(reader, &Element::plain(term), "coef", whose)?.value;
-        tendon.only = tendon.terms.is_empty().then_some(known.index);
+        tendon.only = tendon.terms.is_empty().then_some((known.index, known.rest));
         tendon.terms.push((known.name.clone(), known.reference, ratio));
     }
     Some(tendon)
@@ -120,27 +120,39 @@ fn act(reader: &mut Reader, element: &Element, tendon: &Tendon, rules: Rules, ra
             continue;
         }
         let linear = given.value[1..].iter().all(|x| *x == 0.0);
-        let joint = tendon.only.filter(|_| linear).and_then(|k| raw.joints.get_mut(k));
-        let (Some(joint), true) = (joint, key != "stiffness") else {
+        let joint = tendon.only.filter(|_| linear).and_then(|(k, rest)| Some((raw.joints.get_mut(k)?, rest)));
+        let fits = joint.is_some_and(|(joint, rest)| match key {
+            "stiffness" => spring(element, joint, rest, tendon.terms[0].2, &given),
+            "damping" => add(&mut joint.damping, tendon.terms[0].2, &given),
+            _ => add(&mut joint.armature, tendon.terms[0].2, &given),
+        });
+        if !fits {
             let message = format!("{whose}`{key}` of a tendon is not modelled");
             let help = "set it to 0, and add its effort as one of your own";
             reader.findings.error(given.span, message, help);
-            continue;
-        };
-        let ratio = tendon.terms[0].2;
-        let slot = if key == "damping" { &mut joint.damping } else { &mut joint.armature };
-        add(slot, given.value[0] * ratio * ratio, &given);
+        }
     }
     if spatial {
         reader.tally.notice(place(element.node), "spatial tendons are not used");
     }
 }
 
-/// Adds to the coefficient of a joint of one freedom.
-fn add(slot: &mut Option<RawFreedoms>, more: f64, at: &Spanned<Vec<f64>>) {
+/// A spring on one joint whose length is relaxed where the joint's own springs are; others are not expressed.
+fn spring(element: &Element, joint: &mut RawJoint, rest: f64, ratio: f64, given: &Spanned<Vec<f64>>) -> bool {
+    let own_length = element.attribute("springlength").is_none_or(|text| text.value.trim() == "-1");
+    if own_length {
+        joint.rest = (rest != 0.0).then(|| RawFreedoms::All(RawNumber::constant(rest, given.span)));
+        add(&mut joint.stiffness, ratio, given);
+    }
+    own_length
+}
+
+/// Adds to the coefficient of a joint of one freedom what acts on its coordinate times a ratio.
+fn add(slot: &mut Option<RawFreedoms>, ratio: f64, given: &Spanned<Vec<f64>>) -> bool {
     let old = match slot {
         Some(RawFreedoms::All(Spanned { value: RawValue::Const(x), .. })) => *x,
         _ => 0.0,
     };
-    *slot = Some(RawFreedoms::All(RawNumber::constant(old + more, at.span)));
+    *slot = Some(RawFreedoms::All(RawNumber::constant(old + given.value[0] * ratio * ratio, given.span)));
+    true
 }
