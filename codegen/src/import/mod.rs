@@ -30,11 +30,12 @@ choice! {
 pub struct ImportOptions {
     /// Attachment of the root; for URDF only.
     pub base: Base,
-    /// Gravity in ground axes, m/s², instead of that of the file (URDF states none: `[0, 0, -9.81]`).
+    /// Gravity in ground axes, m/s², instead of that of the file (URDF states none: `[0, 0, -9.81]`, which is also the
+    /// default of MJCF).
     pub gravity: Option<[f64; 3]>,
-    /// Whether `limit`s are stops; for URDF only.
+    /// Whether joint limits are stops; for URDF and MJCF only.
     pub limits: bool,
-    /// A floor that the shapes of the robot can touch; for URDF only. Without one, they touch nothing.
+    /// A floor that the shapes of the robot can touch; for URDF and MJCF only. Without one, they touch nothing.
     pub floor: Option<Floor>,
 }
 
