@@ -40,7 +40,7 @@ pub struct Variant {
 /// `<robot>` (URDF) or a `<mujoco>` (MJCF) in it.
 ///
 /// `file` names the source in the findings and in the origins of the model, and gives the model its name if the text
-/// does not. Of other files, only the `[base]` that a TOML text names and those that an MJCF text includes are read, from
+/// does not. Of other files, only the `[base]` that a TOML text names, and the included files and meshes of an MJCF text are read, from
 /// their paths relative to the folder of `file`.
 ///
 /// # Errors
@@ -147,27 +147,27 @@ pub fn load_variant(
 
 /// [`load`], with all variants.
 pub fn load_all(file: &str, text: &str, options: &ImportOptions) -> (Option<(Model, Vec<Variant>)>, Diagnostics) {
-    load_with(file, text, options, &read_text)
+    load_with(file, text, options, &read_bytes)
 }
 
 /// Largest size of a description, bytes. None is as long, but a device file may be endless.
 const LONGEST: u64 = 256 << 20;
 
-/// Reads the text of a file of at most 256 MiB.
+/// Reads a file of at most 256 MiB.
 ///
 /// # Errors
 /// Those of reading, and a longer file.
-pub fn read_text(path: &Path) -> std::io::Result<String> {
-    let mut text = String::new();
-    let length = std::fs::File::open(path)?.take(LONGEST + 1).read_to_string(&mut text)?;
+pub fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let length = std::fs::File::open(path)?.take(LONGEST + 1).read_to_end(&mut bytes)?;
     if length as u64 > LONGEST {
         return Err(std::io::Error::other(format!("it is longer than {} MiB", LONGEST >> 20)));
     }
-    Ok(text)
+    Ok(bytes)
 }
 
-/// [`load_all`], with the `[base]` of a TOML text and the files that an MJCF text includes read by `files`, to which
-/// their paths are given as they are relative to `file`.
+/// [`load_all`], with the `[base]` of a TOML text and the files that an MJCF text names read by `files`, to which their
+/// paths are given as they are relative to `file`.
 pub fn load_with(
     file: &str,
     text: &str,

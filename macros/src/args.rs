@@ -82,7 +82,7 @@ pub enum Modes {
     Listed(String),
 }
 
-const KEYS: [&str; 18] = [
+const KEYS: [&str; 19] = [
     "path",
     "name",
     "variant",

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use mbd_codegen::diag::{Diagnostic, Severity};
 use mbd_codegen::model::Model;
 use mbd_codegen::modes::{parse, ModeChoice};
-use mbd_codegen::read::{chosen, load_with, read_text, Base, ImportOptions, Variant};
+use mbd_codegen::read::{chosen, load_with, read_bytes, Base, ImportOptions, Variant};
 use mbd_codegen::words::{closest, did_you_mean, list, quote};
 use mbd_codegen::{generate, transfer_code, Output};
 use proc_macro2::{Group as Tokens, Ident, Literal, Span, TokenStream, TokenTree};
@@ -175,9 +175,9 @@ impl Text {
         let files = |path: &Path| {
             let root = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from).unwrap_or_default();
             let file = root.join(path);
-            let text = read_text(&file)?;
+            let bytes = read_bytes(&file)?;
             named.borrow_mut().push(file);
-            Ok(text)
+            Ok(bytes)
         };
         let base = args.base.map_or(Base::default(), |(base, _)| base);
         // This is reported at the argument itself.

@@ -67,7 +67,13 @@ impl XmlFormat {
 }
 
 /// How the files that a description names, as its base or to include them, are read.
-pub type ReadFile<'f> = &'f dyn Fn(&std::path::Path) -> std::io::Result<String>;
+pub type ReadFile<'f> = &'f dyn Fn(&std::path::Path) -> std::io::Result<Vec<u8>>;
+
+/// The text of a file that a description names.
+fn text(files: ReadFile, path: &std::path::Path) -> std::io::Result<String> {
+    let wrong = |_| std::io::Error::new(std::io::ErrorKind::InvalidData, "it is not UTF-8 text");
+    String::from_utf8(files(path)?).map_err(wrong)
+}
 
 /// A floor across z of the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use mbd_codegen::read::{load_all, to_toml, Base, ImportOptions};
 
 /// No file is there.
-fn none(path: &Path) -> std::io::Result<String> {
+fn none(path: &Path) -> std::io::Result<Vec<u8>> {
     Err(std::io::Error::new(std::io::ErrorKind::NotFound, path.display().to_string()))
 }
 
@@ -26,7 +26,7 @@ fn converted(path: &Path, options: &ImportOptions) {
     let (file, text) = (path.to_string_lossy(), std::fs::read_to_string(path).expect("a model"));
     let (model, _) = load_all(&file, &text, options);
     // A base is there, and is in what was converted.
-    let (toml, _) = to_toml(&file, &text, options, &|path| std::fs::read_to_string(path))
+    let (toml, _) = to_toml(&file, &text, options, &|path| std::fs::read(path))
         .unwrap_or_else(|findings| panic!("{file}: {findings}"));
     let (again, findings) = load_all("again.toml", &toml, &ImportOptions::default());
     assert!(again.is_some() && again == model, "{file}: {findings}");

@@ -7,22 +7,54 @@ use mbd_codegen::model::{ConstraintKind, Gravity, JointKind, LoopKind, Model, Ro
 use mbd_codegen::read::{load_with, to_toml, Base, Floor, ImportOptions};
 
 /// Files that can be included or changed.
-fn files(path: &Path) -> std::io::Result<String> {
-    match path.to_string_lossy().replace('\\', "/").as_str() {
-        "robots/arm.xml" => Ok("<?xml version='1.0'?>\n<mujoco model='arm'>\n<include file='parts/body.xml'/>\n\
-                                <option gravity='0 0 -1'/>\n</mujoco>"
-            .into()),
-        "robots/parts/body.xml" => Ok("<mujocoinclude>\n<worldbody><include file='parts/tip.xml'/></worldbody>\n\
-                                       </mujocoinclude>\n"
-            .into()),
-        "robots/parts/tip.xml" => {
-            Ok("<x><body name='tip'><joint name='j'/>\n<geom size='0.1' type='bal'/></body></x>".into())
+fn files(path: &Path) -> std::io::Result<Vec<u8>> {
+    let path = path.to_string_lossy().replace('\\', "/");
+    let text = match path.as_str() {
+        "robots/arm.xml" => ARM,
+        "robots/parts/body.xml" => {
+            "<mujocoinclude>\n<worldbody><include file='parts/tip.xml'/></worldbody>\n</mujocoinclude>\n"
         }
-        "robots/parts/good.xml" => Ok("<x><body name='tip'><joint name='j'/><geom size='0.1'/></body></x>".into()),
-        "robots/parts/ring.xml" => Ok("<x><include file='parts/ring.xml'/></x>".into()),
-        "robots/parts/open.xml" => Ok("<x>\n<body></x>".into()),
-        _ => Err(Error::new(ErrorKind::NotFound, "no such file")),
+        "robots/parts/tip.xml" => "<x><body name='tip'><joint name='j'/>\n<geom size='0.1' type='bal'/></body></x>",
+        "robots/parts/good.xml" => "<x><body name='tip'><joint name='j'/><geom size='0.1'/></body></x>",
+        "robots/parts/ring.xml" => "<x><include file='parts/ring.xml'/></x>",
+        "robots/parts/open.xml" => "<x>\n<body></x>",
+        "robots/meshes/corner.obj" => {
+            "# a tetrahedron\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1/1 4/1 3/1\nf -3 -2 -1\n"
+        }
+        "robots/meshes/corner.stl" => return Ok(stl()),
+        "robots/meshes/corner.msh" => return Ok(msh()),
+        "robots/meshes/short.stl" => return Ok(stl()[..90].to_vec()),
+        "robots/meshes/square.obj" => "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3 4\n",
+        "robots/meshes/lost.obj" => "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n",
+        "robots/meshes/flat.obj" => "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+        _ => return Err(Error::new(ErrorKind::NotFound, "no such file")),
+    };
+    Ok(text.as_bytes().to_vec())
+}
+
+/// The robot in `robots/arm.xml`.
+const ARM: &str = "<?xml version='1.0'?>\n<mujoco model='arm'>\n<include file='parts/body.xml'/>\n\
+                   <option gravity='0 0 -1'/>\n</mujoco>";
+
+/// The corners and faces of a tetrahedron.
+const CORNERS: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+const FACES: [[i32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+
+fn stl() -> Vec<u8> {
+    let mut bytes = vec![0; 80];
+    bytes.extend(4u32.to_le_bytes());
+    for face in FACES {
+        bytes.extend([0; 12]);
+        face.iter().for_each(|k| CORNERS[*k as usize].iter().for_each(|x| bytes.extend(x.to_le_bytes())));
+        bytes.extend([0; 2]);
     }
+    bytes
+}
+
+fn msh() -> Vec<u8> {
+    let counts = [4, 0, 0, 4].iter().flat_map(|n: &i32| n.to_le_bytes());
+    let corners = CORNERS.iter().flatten().flat_map(|x| x.to_le_bytes());
+    counts.chain(corners).chain(FACES.iter().flatten().flat_map(|k| k.to_le_bytes())).collect()
 }
 
 fn load(file: &str, text: &str, options: &ImportOptions) -> (Option<Model>, String) {
@@ -338,11 +370,10 @@ fn names_that_are_taken_or_missing() {
 #[test]
 fn included_files_are_read_and_named() {
     let options = ImportOptions::default();
-    let text = files(Path::new("robots/arm.xml")).expect("a file");
-    let (m, findings) = load("robots/arm.xml", &text, &options);
+    let (m, findings) = load("robots/arm.xml", ARM, &options);
     assert!(m.is_none());
     assert!(findings.contains("robots/parts/tip.xml:2:24: error: geom in body `tip`: `type` is `bal`"), "{findings}");
-    let (m, findings) = load("robots/arm.xml", &text.replace("body.xml", "none.xml"), &options);
+    let (m, findings) = load("robots/arm.xml", &ARM.replace("body.xml", "none.xml"), &options);
     assert!(m.is_none());
     assert!(
         findings.contains("robots/arm.xml:3:16: error: cannot include `parts/none.xml`: no such file"),
@@ -371,7 +402,7 @@ fn included_files_are_read_and_named() {
 fn a_toml_text_changes_a_model_of_mujoco() {
     let text = "[base]\nfile = 'changed.xml'\n[[joint]]\nname = 'j'\narmature = 0.5\n";
     let with_base = |path: &Path| match path.to_string_lossy().ends_with("changed.xml") {
-        true => Ok("<mujoco>\n<worldbody><include file='parts/good.xml'/></worldbody>\n<optoin/>\n</mujoco>".into()),
+        true => Ok(b"<mujoco>\n<worldbody><include file='parts/good.xml'/></worldbody>\n<optoin/>\n</mujoco>".to_vec()),
         false => files(path),
     };
     let options = ImportOptions::default();
@@ -392,4 +423,41 @@ fn deep_nesting_is_no_trouble() {
     assert_eq!(m.joints.len(), depth);
     let findings = refused(&format!("{}{}", "<default class='a'>".repeat(200), "</default>".repeat(200)));
     assert!(findings.contains("error"), "{findings}");
+}
+
+#[test]
+fn inertias_of_meshes() {
+    let text = |mesh: &str, geom: &str| {
+        format!(
+            "<compiler meshdir='meshes'/><asset><mesh name='m' {mesh}/></asset><worldbody><body name='b'><joint name='j'/>\
+             <geom type='mesh' mesh='m' {geom}/></body></worldbody>"
+        )
+    };
+    let inline = "vertex='0 0 0 1 0 0 0 1 0 0 0 1' face='0 2 1 0 1 3 0 3 2 1 2 3'";
+    for mesh in ["file='corner.stl'", "file='corner.msh'", "file='corner.obj'", inline] {
+        for how in ["", "inertia='exact'"] {
+            let (m, _) = model(&text(&format!("{mesh} {how} scale='2 2 2'"), "mass='3' pos='1 0 0'"));
+            // Of a tetrahedron with legs a: a/4, 3/80 m a² and 1/80 m a².
+            near(m.bodies[0].com, [1.5, 0.5, 0.5]);
+            near(m.bodies[0].inertia, [0.9, 0.9, 0.9, 0.15, 0.15, 0.15]);
+        }
+    }
+    let (m, _) = model(&text("file='corner.stl'", "density='6'"));
+    near([m.bodies[0].mass], [1.0]);
+    for (mesh, said) in [
+        ("file='none.stl'", "mesh `m`: cannot read `none.stl`: no such file"),
+        ("file='/corner.stl'", "mesh `m`: its path is not relative to the main file"),
+        ("file='short.stl'", "mesh `m`: the STL file has another size than its header says"),
+        ("file='square.obj'", "mesh `m`: line 5 of the OBJ file is no triangle"),
+        ("file='lost.obj'", "mesh `m`: a face has a vertex that there is not"),
+        ("file='flat.obj'", "mesh `m`: the mesh bounds no volume"),
+        ("file='corner.ply'", "mesh `m`: cannot read"),
+        ("file='corner.stl' inertia='convex'", "mesh `m`: the inertia of the convex hull"),
+        ("builtin='sphere'", "mesh `m`: a mesh that MuJoCo makes is not read"),
+    ] {
+        let findings = refused(&text(mesh, ""));
+        assert!(findings.contains(said), "{said}: {findings}");
+        // Where no mass depends on it, nothing is read.
+        assert!(model(&text(mesh, "mass='0'/><geom size='0.1'")).1.contains("not used for contacts"));
+    }
 }

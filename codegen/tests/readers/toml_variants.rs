@@ -81,7 +81,7 @@ fn a_file_gives_a_variant() {
         "m.toml",
         ALL,
         &ImportOptions::default(),
-        &|path| std::fs::read_to_string(path),
+        &|path| std::fs::read(path),
         Some("xyz"),
     );
     assert!(model.is_none() && findings.to_string().contains("the variants are `dropped`"), "{findings}");

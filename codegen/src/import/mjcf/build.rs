@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::geom::{self, Geom};
 use super::inertia;
 use super::joint::{self, Joint, Kind, Rules};
+use super::mesh::Meshes;
 use super::pose::{between, pose, Pose};
 use super::tree::{Body, Part};
 use crate::import::raw::{RawBody, RawFrame, RawJoint, RawModel};
@@ -70,7 +71,7 @@ pub(super) fn all<'d>(
     reader: &mut Reader,
     bodies: &[Body<'d>],
     rules: Rules,
-    shape_names: Taken,
+    (meshes, shape_names): (&Meshes, Taken),
     raw: &mut RawModel,
 ) -> Built<'d> {
     let mut built = Built { shape_names, ..Built::default() };
@@ -93,8 +94,8 @@ pub(super) fn all<'d>(
             raw.shapes.extend(geom.shape(reader, &part.element, &built.names[k], &mut built.shape_names));
         }
         if k > 0 {
-            let geoms: Vec<Geom> = geoms.into_iter().map(|(_, geom)| geom).collect();
-            masses.push(inertia::of_body(reader, body, &geoms, rules.compiler));
+            let mut geoms: Vec<Geom> = geoms.into_iter().map(|(_, geom)| geom).collect();
+            masses.push(inertia::of_body(reader, body, &mut geoms, rules.compiler, meshes));
             built.chain(reader, (k, body), &joint_names[k], rules, raw);
         }
         for part in &body.sites {

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use super::element::{choice, flag, number, parsed, Element};
+use super::mesh::{Meshes, Solid};
 use super::pose::{between, pose, raw_vec, Pose};
 use super::settings::Compiler;
 use super::tree::Part;
@@ -58,7 +59,7 @@ const ATTRIBUTES: &[&str] = &[
 const TYPES: &[&str] = &["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"];
 
 /// A geom in its body.
-pub(super) struct Geom {
+pub(super) struct Geom<'d> {
     /// One of MuJoCo's types.
     kind: &'static str,
     /// MuJoCo's sizes: radius, half lengths, semi-axes, m.
@@ -70,22 +71,23 @@ pub(super) struct Geom {
     mass: Option<f64>,
     density: f64,
     group: f64,
-    /// Whether its shape is that of a mesh.
-    mesh: bool,
+    /// The mesh that it names.
+    mesh: Option<Spanned<&'d str>>,
+    /// The body that its mesh bounds, once it was read.
+    solid: Option<Solid>,
     touches: bool,
     /// Its place.
     pub span: Span,
 }
 
 /// Reads a geom; `None` where something was reported that leaves it without meaning.
-pub(super) fn read(reader: &mut Reader, part: &Part, compiler: &Compiler, whose: &str) -> Option<Geom> {
+pub(super) fn read<'d>(reader: &mut Reader, part: &Part<'d>, compiler: &Compiler, whose: &str) -> Option<Geom<'d>> {
     let element = &part.element;
     reader.attributes(element.node, ATTRIBUTES);
     for plugin in reader.children(element.node, &["plugin"], &[]) {
         reader.findings.error(place(plugin), format!("{whose}`plugin` is not read"), "remove it");
     }
     let kind = match element.attribute("type") {
-        None if element.attribute("mesh").is_some() && element.attribute("type").is_none() => "mesh",
         None => "sphere",
         Some(_) => choice(reader, element, "type", TYPES, whose)?.value,
     };
@@ -101,7 +103,8 @@ pub(super) fn read(reader: &mut Reader, part: &Part, compiler: &Compiler, whose:
     }
     let touches = number(reader, "contype", 1.0) != 0.0 || number(reader, "conaffinity", 1.0) != 0.0;
     let group = number(reader, "group", 0.0);
-    let mesh = element.attribute("mesh").is_some() || kind == "mesh" || kind == "sdf";
+    let mesh = element.attribute("mesh");
+    let sized = mesh.is_none() && !["mesh", "sdf", "hfield"].contains(&kind);
     let ends = between(reader, element, whose);
     if ends.is_none() && element.attribute("fromto").is_some() {
         return None;
@@ -110,10 +113,10 @@ pub(super) fn read(reader: &mut Reader, part: &Part, compiler: &Compiler, whose:
         Some((pose, _)) => *pose,
         None => pose(reader, element, compiler, whose),
     };
-    let size = if mesh || kind == "hfield" { [0.0; 3] } else { size(reader, element, kind, ends.map(|e| e.1), whose)? };
+    let size = if sized { size(reader, element, kind, ends.map(|e| e.1), whose)? } else { [0.0; 3] };
     let shell = flag(reader, element, "shellinertia", whose).unwrap_or(false);
     let pose = part.frame.then(&own);
-    Some(Geom { kind, size, pose, shell, mass, density, group, mesh, touches, span: place(element.node) })
+    Some(Geom { kind, size, pose, shell, mass, density, group, mesh, solid: None, touches, span: place(element.node) })
 }
 
 /// MuJoCo's sizes. A class states the first of them, and an element may replace some of these.
@@ -155,19 +158,45 @@ fn size(reader: &mut Reader, element: &Element, kind: &str, half: Option<f64>, w
     Some(size)
 }
 
-impl Geom {
+impl Geom<'_> {
     /// Whether its mass counts.
     pub fn counts(&self, compiler: &Compiler) -> bool {
         let [first, last] = compiler.groups;
         (first..=last).contains(&self.group) && self.mass.unwrap_or(self.density) > 0.0 && self.kind != "plane"
     }
 
-    /// What its mass depends on and is not read.
-    pub fn unread(&self) -> Option<&'static str> {
-        match self.mesh {
-            true => Some("mesh"),
-            false => (self.kind == "hfield").then_some("height field"),
+    /// What its shape is, where that is not read.
+    fn unread(&self) -> Option<&'static str> {
+        match (self.kind, &self.mesh) {
+            ("hfield", _) => Some("height field"),
+            ("sdf", _) => Some("signed distance field"),
+            ("mesh", None) => Some("mesh without a name"),
+            ("mesh", Some(_)) | (_, None) => None,
+            (_, Some(_)) => Some("primitive that is fitted to a mesh"),
         }
+    }
+
+    /// Reads what its mass depends on.
+    pub fn weigh(&mut self, reader: &mut Reader, meshes: &Meshes, whose: &str) {
+        if let Some(what) = self.unread() {
+            let message = format!("{whose}the mass of a {what} is not read");
+            let help = "give the body an `inertial` (MuJoCo writes all of them with `saveinertial=\"true\"`), or the \
+                        geom `mass=\"0\"`";
+            reader.tally.add(Severity::Error, &format!("{what} {}", quote(whose)), self.span, message, help);
+        } else if let Some(mesh) = &self.mesh {
+            self.solid = meshes.solid(reader, mesh);
+        }
+    }
+
+    /// Centre of mass in its own axes, m.
+    pub fn com(&self) -> [f64; 3] {
+        self.solid.map_or([0.0; 3], |solid| solid.com)
+    }
+
+    /// About its centre of mass, in its own axes, `[xx, yy, zz, xy, xz, yz]`, kg m².
+    pub fn inertia(&self) -> [f64; 6] {
+        let [a, b, c] = self.moments();
+        self.solid.map_or([a, b, c, 0.0, 0.0, 0.0], |solid| solid.inertia.map(|x| x * self.mass()))
     }
 
     /// Mass, kg.
@@ -182,6 +211,9 @@ impl Geom {
 
     /// Volume, m³, or area of a shell, m².
     fn volume(&self) -> f64 {
+        if let Some(solid) = self.solid {
+            return solid.volume;
+        }
         let [a, b, c] = self.size;
         match (self.kind, self.shell) {
             ("sphere", false) => 4.0 * PI * a * a * a / 3.0,
@@ -203,8 +235,8 @@ impl Geom {
         }
     }
 
-    /// Principal moments about its centre, in its own axes, kg m².
-    pub fn moments(&self) -> [f64; 3] {
+    /// Principal moments of a primitive about its centre, in its own axes, kg m².
+    fn moments(&self) -> [f64; 3] {
         let (m, [a, b, c]) = (self.mass(), self.size);
         let (aa, bb, cc) = (a * a, b * b, c * c);
         match (self.kind, self.shell) {
@@ -239,9 +271,8 @@ impl Geom {
         if !self.touches {
             return None;
         }
-        if let Some(what) = self.unread() {
-            let message = format!("the shape of a {what} is not used for contacts");
-            reader.tally.notice(self.span, &message);
+        if self.mesh.is_some() || ["mesh", "sdf", "hfield"].contains(&self.kind) {
+            reader.tally.notice(self.span, "shapes of meshes and height fields are not used for contacts");
             return None;
         }
         let span = self.span;
@@ -314,12 +345,4 @@ fn thin_ellipsoid(m: f64, size: [f64; 3]) -> [f64; 3] {
     };
     let (outer, inner) = (moments(outer), moments(size));
     [0, 1, 2].map(|k| outer[k] - inner[k])
-}
-
-/// What is said of a geom whose mass is not known.
-pub(super) fn refuse(reader: &mut Reader, geom: &Geom, what: &str, whose: &str) {
-    let message = format!("{whose}the mass of a {what} is not read");
-    let help = "give the body an `inertial` (MuJoCo writes all of them with `saveinertial=\"true\"`), or the geom \
-                `mass=\"0\"`";
-    reader.tally.add(Severity::Error, &format!("{what} {}", quote(whose)), geom.span, message, help);
 }

@@ -9,7 +9,7 @@ use super::element::attribute;
 use crate::import::source::{Findings, Source, Span};
 use crate::import::words::quote;
 use crate::import::xml::{place, syntax_error};
-use crate::import::ReadFile;
+use crate::import::{text, ReadFile};
 use roxmltree::{Document, Node};
 
 /// Levels of files that include each other.
@@ -139,7 +139,7 @@ impl Expansion<'_, '_, '_> {
         if !self.included.insert(plain(&path)) {
             return refuse(format!("{shown} is included a second time"), "a file is included once");
         }
-        let text = match (self.files)(&path) {
+        let text = match text(self.files, &path) {
             Ok(text) => text,
             Err(error) => {
                 let help = "the path is relative to the folder of the main file";

@@ -1,16 +1,17 @@
 //! Masses and inertias of bodies: as stated, or from their geoms.
 
 use super::element::{number, numbers, vec3, Element};
-use super::geom::{self, Geom, NOTHING};
+use super::geom::{Geom, NOTHING};
+use super::mesh::Meshes;
 use super::pose::{orientation, raw_vec, rotation, Quat, NONE};
 use super::settings::{Compiler, FromGeoms};
 use super::tree::Body;
 use crate::import::raw::{RawBody, RawNumber};
 use crate::import::source::{Span, Spanned};
 use crate::import::xml::{place, Reader};
-use crate::inertia::{about_com, moved, sum, Inertia};
-use crate::model::{Placement, Rotation, Value};
-use crate::symmetric::{eigenvectors, full};
+use crate::inertia::{about_com, moved, own, sum, Inertia};
+use crate::model::{self, Placement, Rotation, Value};
+use crate::symmetric::eigenvectors;
 use roxmltree::Node;
 
 /// Mass and inertia of a body.
@@ -27,7 +28,13 @@ pub(super) struct Mass {
 }
 
 /// Mass and inertia of a body with these geoms; the world has none.
-pub(super) fn of_body(reader: &mut Reader, body: &Body, geoms: &[Geom], compiler: &Compiler) -> Mass {
+pub(super) fn of_body(
+    reader: &mut Reader,
+    body: &Body,
+    geoms: &mut [Geom],
+    compiler: &Compiler,
+    meshes: &Meshes,
+) -> Mass {
     let whose = format!("{}: ", body.shown());
     let mut mass = body.inertial.and_then(|node| inertial(reader, node, compiler, &whose));
     let inferred = match compiler.from_geoms {
@@ -36,10 +43,8 @@ pub(super) fn of_body(reader: &mut Reader, body: &Body, geoms: &[Geom], compiler
         FromGeoms::Missing => body.inertial.is_none(),
     };
     if inferred {
-        for geom in geoms.iter().filter(|geom| geom.counts(compiler)) {
-            if let Some(what) = geom.unread() {
-                geom::refuse(reader, geom, what, &whose);
-            }
+        for geom in geoms.iter_mut().filter(|geom| geom.counts(compiler)) {
+            geom.weigh(reader, meshes, &whose);
         }
         mass = of_geoms(geoms, compiler).or(mass);
     }
@@ -79,21 +84,26 @@ fn inertial(reader: &mut Reader, node: Node, compiler: &Compiler, whose: &str) -
 
 /// The inertia of the geoms that count; `None` where none does.
 fn of_geoms(geoms: &[Geom], compiler: &Compiler) -> Option<Mass> {
-    let counting = |geom: &&Geom| geom.counts(compiler) && geom.unread().is_none() && geom.mass() > NOTHING;
-    let all: Vec<&Geom> = geoms.iter().filter(counting).collect();
-    let first = *all.first()?;
+    let all: Vec<&Geom> = geoms.iter().filter(|geom| geom.counts(compiler) && geom.mass() > NOTHING).collect();
+    let span = all.first()?.span;
     if let [only] = all.as_slice() {
-        let [a, b, c] = only.moments();
-        let inertia = [a, b, c, 0.0, 0.0, 0.0];
-        return Some(Mass { mass: only.mass(), com: only.pose.xyz, inertia, axes: only.pose.quat, span: only.span });
+        let com = only.pose.point(only.com());
+        return Some(Mass { mass: only.mass(), com, inertia: only.inertia(), axes: only.pose.quat, span });
     }
-    let each = all.iter().map(|geom| {
-        let [a, b, c] = geom.moments();
-        let own = Inertia { mass: geom.mass(), first: [0.0; 3], about_origin: full([a, b, c, 0.0, 0.0, 0.0]) };
-        moved(own, &placement(geom), &[])
-    });
+    let each = all.iter().map(|geom| moved(own(&alone(geom), &[]), &placement(geom), &[]));
     let (mass, com, inertia) = about_com(each.fold(Inertia::default(), sum));
-    Some(Mass { mass, com, inertia, axes: NONE, span: first.span })
+    Some(Mass { mass, com, inertia, axes: NONE, span })
+}
+
+/// A geom as a body in its own axes.
+fn alone(geom: &Geom) -> model::Body {
+    model::Body {
+        name: String::new(),
+        mass: Value::Const(geom.mass()),
+        com: geom.com().map(Value::Const),
+        inertia: geom.inertia().map(Value::Const),
+        inertia_axes: Rotation::NONE,
+    }
 }
 
 fn placement(geom: &Geom) -> Placement {

@@ -17,12 +17,14 @@ mod geom;
 mod include;
 mod inertia;
 mod joint;
+mod mesh;
 mod pose;
 mod settings;
 mod tendon;
 mod tree;
 
 use std::collections::HashMap;
+use std::path::Path;
 
 use super::raw::{RawGravity, RawModel};
 use super::source::{Findings, Span, Spanned};
@@ -33,22 +35,22 @@ use super::xml::{place, shown, syntax_error, without_late_declaration, Reader};
 use super::{floor, Base, ImportOptions, ReadFile};
 use classes::Classes;
 use joint::Rules;
+use mesh::Meshes;
 use roxmltree::{Document, Node};
 use settings::{Compiler, Options};
 
 /// Elements of a `mujoco` that are not read, and what is said of them.
-const IGNORED: [(&str, &str); 8] = [
+const IGNORED: [(&str, &str); 7] = [
     ("size", ""),
     ("visual", ""),
     ("statistic", ""),
-    ("asset", ""),
     ("custom", "`custom` is not used"),
     ("sensor", "`sensor` is not used"),
     ("keyframe", "`keyframe` is not used: a motion starts where the file places the bodies"),
     ("contact", "`contact` is not used: shapes touch nothing but the floor that is asked for"),
 ];
 
-const USED: [&str; 10] = [
+const USED: [&str; 11] = [
     "compiler",
     "option",
     "default",
@@ -59,6 +61,7 @@ const USED: [&str; 10] = [
     "deformable",
     "extension",
     "include",
+    "asset",
 ];
 
 /// Reads a model without checking the mechanism; `None` where the text is no model of MuJoCo, or says something that
@@ -80,14 +83,20 @@ pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings, files:
         let help = "leave the option out; in the file, the joints of a body say how it is attached";
         findings.error(Span::FILE, "a model of MuJoCo states its own base", help);
     }
+    let main = findings.origin(place(document.root_element())).file;
     let mut reader = Reader { findings, tally: Tally::default() };
-    let raw = read_mujoco(&mut reader, document.root_element(), options);
+    let raw = read_mujoco(&mut reader, document.root_element(), options, (Path::new(&*main), files));
     let Reader { findings, tally } = reader;
     tally.report(findings);
     raw.filter(|_| !findings.has_errors())
 }
 
-fn read_mujoco<'d>(reader: &mut Reader, root: Node<'d, 'd>, options: &ImportOptions) -> Option<RawModel> {
+fn read_mujoco<'d>(
+    reader: &mut Reader,
+    root: Node<'d, 'd>,
+    options: &ImportOptions,
+    files: (&Path, ReadFile),
+) -> Option<RawModel> {
     if root.tag_name().name() != "mujoco" {
         let message = format!("{} is not a model of MuJoCo", quote(shown(root)));
         reader.findings.error(place(root), message, "an MJCF file is one `mujoco` element");
@@ -120,7 +129,8 @@ fn read_mujoco<'d>(reader: &mut Reader, root: Node<'d, 'd>, options: &ImportOpti
         floor::add(floor, &mut shapes, &mut raw);
     }
     let rules = Rules { compiler: &compiler, options: &settings, stops: options.limits };
-    let mut built = build::all(reader, &bodies, rules, shapes, &mut raw);
+    let meshes = Meshes::new(reader, &called("asset"), &called("compiler"), &classes, files);
+    let mut built = build::all(reader, &bodies, rules, (&meshes, shapes), &mut raw);
     touching(reader, root, options, &raw);
     let mut tendons = HashMap::new();
     for section in called("tendon") {
