@@ -46,6 +46,15 @@ fn every_model_converts_to_itself() {
     // These are there to be refused.
     all.retain(|path| !path.ends_with("point_on_axis.toml") && !path.ends_with("massless_tip.toml"));
     assert!(all.len() > 40, "{} models", all.len());
+    // Some of MuJoCo's are refused, and some are parts of others.
+    let mut of_mujoco = Vec::new();
+    files(&root.join("../tests/reference/mjcf"), &mut of_mujoco);
+    of_mujoco.retain(|path| {
+        let text = std::fs::read_to_string(path).expect("a model");
+        load_all(&path.to_string_lossy(), &text, &ImportOptions::default()).0.is_some()
+    });
+    assert!(of_mujoco.len() > 36, "{} models of MuJoCo", of_mujoco.len());
+    all.extend(of_mujoco);
     for path in &all {
         converted(path, &ImportOptions::default());
         if path.extension().is_some_and(|e| e == "urdf") {

@@ -40,6 +40,11 @@ def copy(source, target):
         copy(source.parent / name, target.parent / name)
 
 
+def moves(model, body):
+    """Whether a joint moves a body; the user may move those with `mocap`, which are still here."""
+    return body > 0 and (model.body_dofnum[body] > 0 or moves(model, model.body_parentid[body]))
+
+
 def state(model, data, rng, with_matrix):
     """One random state and what MuJoCo computes for it."""
     q, v = model.qpos0.copy(), rng.normal(size=model.nv)
@@ -49,8 +54,8 @@ def state(model, data, rng, with_matrix):
     mujoco.mj_forward(model, data)
     matrix = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, matrix)
-    # Bodies that are welded to the world have a constant potential energy, which does not count here.
-    still = [b for b in range(1, model.nbody) if model.body_weldid[b] == 0]
+    # Bodies that nothing moves have a constant potential energy, which does not count here.
+    still = [b for b in range(1, model.nbody) if not moves(model, b)]
     constant = sum(-model.body_mass[b] * model.opt.gravity @ data.xipos[b] for b in still)
     out = {
         "q": q, "v": v, "p": matrix @ v, "bias": data.qfrc_bias, "passive": data.qfrc_passive,
@@ -75,7 +80,7 @@ def main():
             data = mujoco.MjData(model)
             rng = np.random.default_rng(len(models))
             states = [state(model, data, rng, k == 0) for k in range(STATES)]
-            moving = float(sum(m for m, weld in zip(model.body_mass, model.body_weldid) if weld != 0))
+            moving = float(sum(model.body_mass[b] for b in range(model.nbody) if moves(model, b)))
             models.append({"file": file, "nq": model.nq, "nv": model.nv, "mass": moving, "states": states})
             print(file, model.nq, model.nv)
     text = ",\n".join(json.dumps(entry, separators=(",", ":")) for entry in models)

@@ -3,7 +3,7 @@
 use super::element::{number, numbers, vec3, Element};
 use super::geom::{Geom, NOTHING};
 use super::mesh::Meshes;
-use super::pose::{orientation, raw_vec, rotation, Quat, NONE};
+use super::pose::{orientation, raw_vec, roll_pitch_yaw, rotation, Quat, NONE};
 use super::settings::{Compiler, FromGeoms};
 use super::tree::Body;
 use crate::import::raw::{RawBody, RawNumber};
@@ -152,7 +152,7 @@ impl Mass {
             mass: (self.mass != 0.0).then(|| number(self.mass)),
             com: (self.com != [0.0; 3]).then(|| raw_vec(self.com, span)),
             inertia: some.then(|| Spanned::new(self.inertia.map(number), span)),
-            inertia_axes: if some { rotation(self.axes, span) } else { None },
+            inertia_axes: if some { roll_pitch_yaw(self.axes, span) } else { None },
         }
     }
 }

@@ -80,6 +80,19 @@ pub(super) fn rotation(quat: Quat, span: Span) -> Option<RawRotation> {
     Some(RawRotation::AxisAngle { axis, angle: RawNumber::constant(2.0 * atan2(sine, w), span) })
 }
 
+/// A rotation by roll, pitch and yaw, for axes that the TOML format states so; `None` where there is none.
+pub(super) fn roll_pitch_yaw(quat: Quat, span: Span) -> Option<RawRotation> {
+    let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|e| rotate(quat, e));
+    let across = norm([y[2], z[2]]);
+    // Where x stands upright, roll and yaw turn about the same axis, and one of them is enough.
+    let roll = if across < NOTHING { 0.0 } else { atan2(y[2], z[2]) };
+    let (s, c) = sin_cos(roll);
+    // Yaw as it follows from that roll, whatever its error.
+    let yaw = atan2(s * z[0] - c * y[0], c * y[1] - s * z[1]);
+    let rpy = [roll, atan2(-x[2], across), yaw];
+    rpy.iter().any(|angle| angle.abs() > NOTHING).then(|| RawRotation::Rpy(raw_vec(rpy, span)))
+}
+
 /// The quaternion of a rotation about an axis of unit length by an angle in rad.
 pub(super) fn about(axis: [f64; 3], angle: f64) -> Quat {
     let (s, c) = sin_cos(angle / 2.0);
@@ -248,6 +261,7 @@ pub(super) fn sequence(reader: &mut Reader, element: &Element) -> Option<[u8; 3]
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::import::raw::RawValue;
 
     const Z: [f64; 3] = [0.0, 0.0, 1.0];
 
@@ -266,5 +280,31 @@ mod tests {
         }
         assert!(near(rotate(to_direction([0.0, 0.0, -1.0]), Z), [0.0, 0.0, -1.0]));
         assert_eq!(rotation(NONE, Span::FILE), None);
+    }
+
+    #[test]
+    fn roll_pitch_and_yaw_give_the_rotation_back() {
+        let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], Z];
+        let right = std::f64::consts::FRAC_PI_2;
+        let of = |quat| match roll_pitch_yaw(quat, Span::FILE) {
+            Some(RawRotation::Rpy(rpy)) => rpy.value.map(|angle| match angle.value {
+                RawValue::Const(angle) => angle,
+                _ => f64::NAN,
+            }),
+            _ => [0.0; 3],
+        };
+        // Upright, and next to it.
+        let pitches = [0.0, 0.3, right - 1e-9, right - 1e-15, right, -right, 2.0];
+        for (k, pitch) in pitches.into_iter().enumerate() {
+            let quat = multiply(multiply(about(z, 0.4 + k as f64), about(y, pitch)), about(x, -0.7));
+            let [roll, pitch, yaw] = of(quat);
+            let again = multiply(multiply(about(z, yaw), about(y, pitch)), about(x, roll));
+            for e in [x, y, z] {
+                let (a, b) = (rotate(quat, e), rotate(again, e));
+                assert!((0..3).all(|k| (a[k] - b[k]).abs() < 4e-15), "{k}: {a:?} {b:?}");
+            }
+        }
+        assert_eq!(of(about(y, right))[0], 0.0);
+        assert_eq!(of(NONE), [0.0; 3]);
     }
 }
