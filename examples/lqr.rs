@@ -42,14 +42,14 @@ type Gain = SMatrix<f64, 1, 4>;
 /// `A` and `B` of `ẋ = A x + B u` about the upright rest, `x = (δq, δv)`, `u` the force on the cart, N.
 fn linearised(cart: &CartPole) -> (Matrix4, Vector4<f64>) {
     let (q, v) = ([0.0; 2], [0.0; 2]);
-    let ([mut p, mut pd], [mut dp_dq, mut mass, mut dpd_dq, mut dpd_dv]) = ([[0.0; 2]; 2], [[[0.0; 2]; 2]; 4]);
-    cart.momentum_derivatives(&q, &v, &mut p, &mut pd, &mut dp_dq, &mut mass, &mut dpd_dq, &mut dpd_dv);
+    let mut at = MomentumDerivatives::zero();
+    cart.momentum_derivatives(&q, &v, &mut at);
     let matrix = |m: [[f64; 2]; 2]| SMatrix::<f64, 2, 2>::from_fn(|i, j| m[i][j]);
-    let inverse = matrix(mass).try_inverse().expect("a mass matrix is positive definite");
+    let inverse = matrix(at.dp_dv).try_inverse().expect("a mass matrix is positive definite");
     let mut a = Matrix4::zeros();
     a.fixed_view_mut::<2, 2>(0, 2).fill_with_identity();
-    a.fixed_view_mut::<2, 2>(2, 0).copy_from(&(inverse * matrix(dpd_dq)));
-    a.fixed_view_mut::<2, 2>(2, 2).copy_from(&(inverse * matrix(dpd_dv)));
+    a.fixed_view_mut::<2, 2>(2, 0).copy_from(&(inverse * matrix(at.dpd_dq)));
+    a.fixed_view_mut::<2, 2>(2, 2).copy_from(&(inverse * matrix(at.dpd_dv)));
     (a, Vector4::new(0.0, 0.0, inverse[(0, 0)], inverse[(1, 0)]))
 }
 

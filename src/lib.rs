@@ -116,6 +116,8 @@ mod book {
     struct Constraints;
     #[doc = include_str!("../book/src/contacts.md")]
     struct Contacts;
+    #[doc = include_str!("../book/src/derivatives.md")]
+    struct Derivatives;
     #[doc = include_str!("../book/src/variants.md")]
     struct Variants;
 }

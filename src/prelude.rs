@@ -16,5 +16,6 @@ pub use crate::runtime::integrate::{
     ImplicitMidpoint, Radau5, Rk4, Solver, Step, StepError, Stepper, Tolerances, Verner9,
 };
 pub use crate::runtime::{
-    Accelerated, Conjugate, Constrained, Differentiable, Energetic, Interpreter, Scalar, System, TransferFrom,
+    Accelerated, Conjugate, Constrained, Differentiable, Energetic, Interpreter, MomentumDerivatives, Scalar,
+    StateDerivatives, System, TransferFrom,
 };

@@ -4,10 +4,10 @@ mod directional;
 mod inputs;
 
 use mbd_runtime::spatial::Motion;
-use mbd_runtime::sweep::{Derivatives, FrameState, MomentumDerivatives, ParameterDerivatives, Sweeps};
+use mbd_runtime::sweep::{Derivatives, FrameState, ParameterDerivatives, Sweeps};
 use mbd_runtime::tree::Tree;
 use mbd_runtime::workspace::Workspace;
-use mbd_runtime::{Dual, Scalar};
+use mbd_runtime::{Dual, MomentumDerivatives, Scalar};
 
 use crate::error::GenerateError;
 use crate::options::{Arithmetic, EliminationStrategy, Options, Precision};

@@ -1,19 +1,24 @@
 //! A substitute for a type that could not be generated, so that its uses cause no further errors.
 
-use mbd_codegen::output::{Array, Field, Output, Sizes, Spec, COORDINATE_RATES, FIELDS};
+use mbd_codegen::output::{Dim, Field, Output, Sizes, Spec, COORDINATE_RATES, FIELDS, STRUCTURE};
 use mbd_codegen::Options;
 
 /// So large that no index of a real state is out of bounds.
 const LENGTH: usize = 1000;
 
-/// A function that takes whatever it is given and returns zeros.
-fn function(spec: &Spec, nested: &dyn Fn(&Array, &str) -> String, number: &str, zero: &str) -> String {
-    let written = if spec.returned { &[] } else { spec.results };
+/// A function that takes whatever it is given and returns zeros. An argument whose fields are the results has its type,
+/// which `zero()` would lack otherwise.
+fn function(spec: &Spec, rt: &str, nested: &dyn Fn(&[Dim], &str) -> String, number: &str, zero: &str) -> String {
+    let written = if spec.returned || spec.structure.is_some() { &[] } else { spec.results };
     let arguments = || spec.inputs.iter().chain(written).enumerate();
     let types: String = arguments().map(|(k, _)| format!("A{k}, ")).collect();
-    let taken: String = arguments().map(|(k, array)| format!("_{}: A{k}, ", array.name)).collect();
+    let mut taken: String = arguments().map(|(k, array)| format!("_{}: A{k}, ", array.name)).collect();
+    if let Some(structure) = spec.structure {
+        let shapes: Vec<String> = spec.shapes().into_iter().map(|dims| nested(dims, number)).collect();
+        taken += &format!("_{STRUCTURE}: &mut {rt}::{structure}<{}>", shapes.join(", "));
+    }
     let (returned, body) = match spec.results {
-        [array] if spec.returned => (format!("-> {}", nested(array, number)), nested(array, zero)),
+        [array] if spec.returned => (format!("-> {}", nested(array.dims, number)), nested(array.dims, zero)),
         _ => Default::default(),
     };
     format!("#[doc = \"\"] pub fn {}<{types}>(&self, {taken}) {returned} {{ {body} }}", spec.name)
@@ -25,19 +30,19 @@ pub fn source(options: &Options) -> String {
     let t = options.precision.name();
     let array = format!("[{t}; {LENGTH}]");
     let sizes = Sizes { gravity: 3, ..Sizes::uniform(LENGTH) };
-    let nested = |array: &Array, entry: &str| {
-        array.lengths(&sizes).iter().rev().fold(entry.to_string(), |inner, n| format!("[{inner}; {n}]"))
+    let nested = |dims: &[Dim], entry: &str| {
+        dims.iter().rev().fold(entry.to_string(), |inner, dim| format!("[{inner}; {}]", sizes.of(*dim)))
     };
     let declared = |number: &str| -> String {
-        let field = |f: &Field| format!("#[doc = \"\"] pub {}: {},", f.array.name, nested(&f.array, number));
+        let field = |f: &Field| format!("#[doc = \"\"] pub {}: {},", f.array.name, nested(f.array.dims, number));
         FIELDS.iter().map(field).collect()
     };
     let values = |zero: &str| -> String {
-        FIELDS.iter().map(|f| format!("{}: {},", f.array.name, nested(&f.array, zero))).collect()
+        FIELDS.iter().map(|f| format!("{}: {},", f.array.name, nested(f.array.dims, zero))).collect()
     };
     let functions = |number: &str, zero: &str| -> String {
         let specs = Output::ALL.iter().map(|output| output.spec()).chain([COORDINATE_RATES]);
-        specs.map(|spec| function(spec, &nested, number, zero)).collect()
+        specs.map(|spec| function(spec, rt, &nested, number, zero)).collect()
     };
     let (lane, lane_zero) = (format!("[{t}; LANES]"), "[0.0; LANES]");
     let (lane_fields, lane_values, lane_functions) = (declared(&lane), values(lane_zero), functions(&lane, lane_zero));

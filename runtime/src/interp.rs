@@ -10,9 +10,9 @@ use alloc::vec::Vec;
 use directions::DualRun;
 
 use crate::spatial::Motion;
-use crate::sweep::{Derivatives, FrameState, Inputs, MomentumDerivatives, Sweeps};
+use crate::sweep::{Derivatives, FrameState, Inputs, Sweeps};
 use crate::system::{Accelerated, Conjugate, Constrained, Differentiable, Energetic};
-use crate::system::{LieGroup, LieJoint, Part, Real, Row, StateDerivatives, System};
+use crate::system::{LieGroup, LieJoint, MomentumDerivatives, Part, Real, Row, StateDerivatives, System};
 use crate::tree::{Kind, Source, Tree};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -257,7 +257,13 @@ impl<S: Scalar> Interpreter<S> {
 
     /// Momenta, their rates and derivatives of both at given velocities; `d` and `out` are made of
     /// [`Interpreter::tree`].
-    pub fn momentum_derivatives(&mut self, q: &[S], v: &[S], d: &mut Derivatives<S>, out: &mut MomentumDerivatives<S>) {
+    pub fn momentum_derivatives(
+        &mut self,
+        q: &[S],
+        v: &[S],
+        d: &mut Derivatives<S>,
+        out: &mut MomentumDerivatives<Vec<S>, Vec<S>>,
+    ) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.momentum_derivatives(q, v, &inputs!(self), &mut self.work, d, out);
     }

@@ -50,5 +50,7 @@ pub use error::{ConstraintError, Named, StepError};
 #[cfg(feature = "alloc")]
 pub use interp::{Interpreter, MassMatrixError};
 pub use scalar::Scalar;
-pub use system::{Accelerated, Conjugate, Constrained, Differentiable, Energetic, Real, StateDerivatives, System};
+pub use system::{
+    Accelerated, Conjugate, Constrained, Differentiable, Energetic, MomentumDerivatives, Real, StateDerivatives, System,
+};
 pub use transfer::TransferFrom;

@@ -1,5 +1,9 @@
 //! The traits through which an integrator uses a mechanism.
 
+mod derivatives;
+
+pub use derivatives::{MomentumDerivatives, StateDerivatives, Zero};
+
 use crate::Scalar;
 
 /// A scalar that can be compared, for code that examines results (integrators). Sweeps use [`Scalar`] only.
@@ -291,35 +295,6 @@ pub trait Differentiable: System {
         p: &Self::Momenta,
         out: &mut StateDerivatives<Self::Momenta, Self::Square>,
     );
-}
-
-/// Velocities `v` and momentum rates `ṗ` of a state, and their derivatives with respect to coordinates and momenta.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StateDerivatives<V, M> {
-    /// Velocities, `nv` numbers.
-    pub v: V,
-    /// Momentum rates, `nv` numbers.
-    pub pd: V,
-    /// `∂v/∂q`, `nv × nv`; columns as [`Differentiable`] says.
-    pub dv_dq: M,
-    /// `∂v/∂p`, `nv × nv`: the inverse of the mass matrix.
-    pub dv_dp: M,
-    /// `∂ṗ/∂q`, `nv × nv`.
-    pub dpd_dq: M,
-    /// `∂ṗ/∂p`, `nv × nv`.
-    pub dpd_dp: M,
-}
-
-impl<V, M> StateDerivatives<V, M> {
-    /// The four blocks: rows `v`, `ṗ`; columns `q`, `p`.
-    pub fn blocks(&self) -> [[&M; 2]; 2] {
-        [[&self.dv_dq, &self.dv_dp], [&self.dpd_dq, &self.dpd_dp]]
-    }
-
-    /// The four blocks, for changing them.
-    pub fn blocks_mut(&mut self) -> [[&mut M; 2]; 2] {
-        [[&mut self.dv_dq, &mut self.dv_dp], [&mut self.dpd_dq, &mut self.dpd_dp]]
-    }
 }
 
 /// One scalar constraint of a [`Constrained`] system: a row of `Φ v = b`.

@@ -2,12 +2,12 @@
 
 use multibody::codegen::read::{self, Base, ImportOptions};
 use multibody::codegen::search;
-use multibody::runtime::{Differentiable, Interpreter};
+use multibody::runtime::{Differentiable, Interpreter, MomentumDerivatives, StateDerivatives};
 
 multibody::mbd_model! {
     path = "models/double_pendulum.toml",
     name = DoublePendulum,
-    outputs = [rates, momenta, energy, derivatives]
+    outputs = [rates, momenta, energy, derivatives, momentum_derivatives, mass_matrix]
 }
 
 /// Makes one step `z₁ = z₀ + h f((z₀ + z₁)/2)` of a system whose coordinates are angles. Returns the largest residual
@@ -93,4 +93,60 @@ fn newton_converges_quadratically_in_implicit_steps() {
     }
     let off = q.iter().chain(&p).zip(q_there.iter().chain(&p_there)).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
     assert!(off < 1e-9, "generated and interpreted differ by {off:e}");
+}
+
+/// The fields have the names of what is written to them: canonical symmetry, mass matrix and its inverse, and what the
+/// trait and other functions give.
+#[test]
+fn results_are_the_fields_of_a_named_struct() {
+    let mut model = DoublePendulum::new();
+    let (q, v) = ([1.0, -0.5], [0.3, 2.0]);
+    let mut at_velocities = MomentumDerivatives::zero();
+    model.momentum_derivatives(&q, &v, &mut at_velocities);
+    let (mut p, mut mass) = ([0.0; 2], [[0.0; 2]; 2]);
+    model.momenta(&q, &v, &mut p);
+    model.mass_matrix(&q, &mut mass);
+    assert!(at_velocities.p.iter().zip(&p).all(|(a, b)| (a - b).abs() < 1e-14), "{at_velocities:?}");
+    assert!(at_velocities.dp_dv.iter().flatten().zip(mass.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-14));
+
+    let mut d = StateDerivatives::zero();
+    model.derivatives(&q, &p, &mut d);
+    assert!(d.v.iter().zip(&v).all(|(a, b)| (a - b).abs() < 1e-13), "{d:?}");
+    let StateDerivatives { dv_dq, dv_dp, dpd_dq, dpd_dp, .. } = &d;
+    for (i, k) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        let product: f64 = (0..2).map(|j| dv_dp[i][j] * at_velocities.dp_dv[j][k]).sum();
+        assert!((product - f64::from(u8::from(i == k))).abs() < 1e-13, "{d:?}");
+        // `∂v/∂q = −M⁻¹ ∂p/∂q` at given velocities.
+        let product: f64 = (0..2).map(|j| dv_dp[i][j] * at_velocities.dp_dq[j][k]).sum();
+        assert!((product + dv_dq[i][k]).abs() < 1e-12, "{d:?}");
+        // Without dampers.
+        assert!((dpd_dp[i][k] + dv_dq[k][i]).abs() < 1e-12 && (dpd_dq[i][k] - dpd_dq[k][i]).abs() < 1e-12, "{d:?}");
+    }
+    let (mut traits, mut rates) = (model.zero_derivatives(), [[0.0; 2]; 2]);
+    model.rate_derivatives(0.0, &q, &p, &mut traits);
+    assert_eq!(traits, d);
+    let [qd, pd] = &mut rates;
+    model.rates(&q, &p, qd, pd);
+    assert!(d.pd.iter().zip(&*pd).all(|(a, b)| (a - b).abs() < 1e-12), "{d:?} {pd:?}");
+}
+
+#[test]
+fn lanes_write_the_same_struct_with_arrays_of_lanes() {
+    let model = DoublePendulum::new();
+    let (q, p) = ([[1.0, 0.2, -0.4], [-0.5, 0.7, 2.0]], [[0.1, -0.2, 0.3], [0.4, 0.5, -0.6]]);
+    let (mut d, mut m) = (StateDerivatives::zero(), MomentumDerivatives::zero());
+    model.lanes::<3>().derivatives(&q, &p, &mut d);
+    model.lanes::<3>().momentum_derivatives(&q, &p, &mut m);
+    for lane in 0..3 {
+        let one = |x: &[[f64; 3]; 2]| x.map(|row| row[lane]);
+        let all = |x: &[[[f64; 3]; 2]; 2]| x.map(|row| row.map(|entry| entry[lane]));
+        let (mut alone, mut at_velocities) = (StateDerivatives::zero(), MomentumDerivatives::zero());
+        model.derivatives(&one(&q), &one(&p), &mut alone);
+        model.momentum_derivatives(&one(&q), &one(&p), &mut at_velocities);
+        assert_eq!((one(&d.v), one(&d.pd)), (alone.v, alone.pd));
+        assert_eq!(d.blocks().map(|row| row.map(all)), alone.blocks().map(|row| row.map(|block| *block)));
+        assert_eq!((one(&m.p), one(&m.pd)), (at_velocities.p, at_velocities.pd));
+        let MomentumDerivatives { dp_dq, dp_dv, dpd_dq, dpd_dv, .. } = at_velocities;
+        assert_eq!([&m.dp_dq, &m.dp_dv, &m.dpd_dq, &m.dpd_dv].map(all), [dp_dq, dp_dv, dpd_dq, dpd_dv]);
+    }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::numbers::{literal, minus, signed};
-use super::signature::{nested, Port, Signature};
+use super::signature::{Port, Signature};
 use crate::options::{Arithmetic, Options};
 use crate::output::{locate, InputArray};
 use crate::symbolic::{FlooredReciprocal, Fma, Op, Operand, ProgramResult};
@@ -47,21 +47,13 @@ impl Head<'_> {
         if statements <= INLINED {
             let _ = writeln!(out, "    #[inline]");
         }
-        let _ = writeln!(out, "    {public}fn {} {{", self.signature.declaration(self.options.precision.name()));
+        let _ = writeln!(out, "    {public}fn {} {{", self.signature.declaration(rt, self.options.precision.name()));
         let arguments: Vec<String> = self.ports.iter().map(Port::argument).collect();
         let call = match self.chooses() {
             true => format!("{rt}::kernel::call::<Self, {id}, _>({})", tuple(&arguments)),
             false => format!("Self::{name}_kernel::<{rt}::kernel::Plain, 1>({})", arguments.join(", ")),
         };
-        match &self.signature.returned {
-            Some(Port { name, dims, .. }) => {
-                let _ = writeln!(out, "        let mut {name} = {};", nested(dims, "0.0"));
-                let _ = writeln!(out, "        {call};\n        {name}\n    }}");
-            }
-            None => {
-                let _ = writeln!(out, "        {call};\n    }}");
-            }
-        }
+        let _ = writeln!(out, "{}    }}", self.signature.body(rt, "0.0", &call));
         let parameters = self.parameters();
         let _ = writeln!(out, "\n    #[inline(always)]");
         let _ = writeln!(out, "    fn {name}_kernel<A: {rt}::kernel::Arithmetic, const LANES: usize>({parameters}) {{");

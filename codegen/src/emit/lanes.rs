@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::fields::{default, type_definition, Field};
 use super::head::tuple;
-use super::signature::{nested, Port, Signature};
+use super::signature::{Port, Signature};
 use crate::options::{Options, Precision};
 use crate::output::Output;
 use crate::plan::Plan;
@@ -90,18 +90,11 @@ impl<const LANES: usize> {name}Lanes<LANES> {{
 /// One function of the type with lanes.
 fn lanes_function(out: &mut String, options: &Options, Kernel { id, signature, ports }: &Kernel, lane: &str) {
     let (name, rt, t) = (&options.type_name, &options.runtime, options.precision.name());
-    let _ =
-        write!(out, "\n{}    #[inline]\n    pub fn {} {{\n", signature.documentation(), signature.declaration(lane));
-    if let Some(port) = &signature.returned {
-        let _ = writeln!(out, "        let mut {} = {};", port.name, nested(&port.dims, "[0.0; LANES]"));
-    }
+    let declaration = signature.declaration(rt, lane);
     let arguments: Vec<String> = ports.iter().map(Port::argument).collect();
-    let call = format!("{rt}::kernel::call_lanes::<{name}, {id}, LANES, {t}, _>");
-    let _ = writeln!(out, "        {call}({});", tuple(&arguments));
-    if let Some(port) = &signature.returned {
-        let _ = writeln!(out, "        {}", port.name);
-    }
-    let _ = writeln!(out, "    }}");
+    let call = format!("{rt}::kernel::call_lanes::<{name}, {id}, LANES, {t}, _>({})", tuple(&arguments));
+    let body = signature.body(rt, "[0.0; LANES]", &call);
+    let _ = write!(out, "\n{}    #[inline]\n    pub fn {declaration} {{\n{body}    }}\n", signature.documentation());
 }
 
 /// Columns as arguments: of joint forces only where they are inputs.

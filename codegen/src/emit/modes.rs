@@ -45,11 +45,13 @@ impl<'a> Contacts<'a> {
     /// The function that calls the one of the modes that were set.
     pub fn dispatch(&self, out: &mut String, signature: &Signature) {
         let name = &signature.name;
-        let arguments: Vec<&str> = signature.arguments.iter().map(|port| port.name).collect();
-        let arguments = arguments.join(", ");
-        let entry = self.options.precision.name();
+        let (arguments, entry) = (signature.names(), self.options.precision.name());
         let _ = write!(out, "\n{}    #[inline]\n", signature.documentation());
-        let _ = writeln!(out, "    pub fn {} {{\n        match self.set {{", signature.declaration(entry));
+        let _ = writeln!(
+            out,
+            "    pub fn {} {{\n        match self.set {{",
+            signature.declaration(&self.options.runtime, entry)
+        );
         for k in 0..self.sets.len() {
             let _ = writeln!(out, "            {k} => self.{}({arguments}),", Self::for_set(name, k));
         }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::output::{Array, InputArray, Sizes, Spec};
+use crate::output::{Array, Dim, InputArray, Sizes, Spec, STRUCTURE};
 
 /// Role of an array in a function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,6 +86,17 @@ impl Port {
     }
 }
 
+/// The argument whose fields the results are.
+#[derive(Clone)]
+pub struct Structure {
+    /// Its type in the runtime.
+    name: &'static str,
+    /// Shapes of its fields, the parameters of the type.
+    shapes: Vec<Vec<usize>>,
+    /// Its fields.
+    fields: Vec<Port>,
+}
+
 /// A generated function, printed as `fn NAME(&self, ARGUMENTS) -> RETURNED`.
 pub struct Signature {
     /// Name of the function.
@@ -94,8 +105,10 @@ pub struct Signature {
     pub public: bool,
     /// Lines of its documentation.
     pub doc: Vec<&'static str>,
-    /// Arguments after `&self`, in order.
-    pub arguments: Vec<Port>,
+    /// Arguments after `&self` that are arrays, in order.
+    arguments: Vec<Port>,
+    /// The last argument, where results are its fields.
+    structure: Option<Structure>,
     /// Returned arrays.
     pub returned: Option<Port>,
 }
@@ -106,14 +119,18 @@ impl Signature {
         let ports =
             |arrays: &[Array], place| arrays.iter().map(move |a| Port::new(a, sizes, place)).collect::<Vec<_>>();
         let mut arguments = ports(spec.inputs, Place::Read);
-        let returned = match spec.returned {
-            true => ports(spec.results, Place::Returned).pop(),
-            false => {
-                arguments.extend(ports(spec.results, Place::Written));
-                None
+        let (mut structure, mut returned) = (None, None);
+        match spec.structure {
+            _ if spec.returned => returned = ports(spec.results, Place::Returned).pop(),
+            None => arguments.extend(ports(spec.results, Place::Written)),
+            Some(name) => {
+                let lengths = |shape: &[Dim]| shape.iter().map(|dim| sizes.of(*dim)).collect();
+                let shapes = spec.shapes().into_iter().map(lengths).collect();
+                structure = Some(Structure { name, shapes, fields: ports(spec.results, Place::Written) });
             }
-        };
-        Signature { name: spec.name.to_string(), public: true, doc: spec.doc().collect(), arguments, returned }
+        }
+        let (name, doc) = (spec.name.to_string(), spec.doc().collect());
+        Signature { name, public: true, doc, arguments, structure, returned }
     }
 
     /// The same under another name, called by the function of the output.
@@ -127,10 +144,34 @@ impl Signature {
     }
 
     /// `NAME(&self, ARGUMENTS) -> RETURNED`, the entries of arrays being of a type.
-    pub fn declaration(&self, entry: &str) -> String {
-        let arguments: Vec<String> = self.arguments.iter().map(|p| p.declaration(entry)).collect();
+    pub fn declaration(&self, runtime: &str, entry: &str) -> String {
+        let mut arguments: Vec<String> = self.arguments.iter().map(|p| p.declaration(entry)).collect();
+        arguments.extend(self.structure.iter().map(|Structure { name, shapes, .. }| {
+            let types: Vec<String> = shapes.iter().map(|dims| nested(dims, entry)).collect();
+            format!("{STRUCTURE}: &mut {runtime}::{name}<{}>", types.join(", "))
+        }));
         let returned = self.returned.as_ref().map_or(String::new(), |p| format!(" -> {}", nested(&p.dims, entry)));
         format!("{}(&self, {}){returned}", self.name, arguments.join(", "))
+    }
+
+    /// The arguments in a call with variables of the same names.
+    pub fn names(&self) -> String {
+        let names = self.arguments.iter().map(|port| port.name).chain(self.structure.iter().map(|_| STRUCTURE));
+        names.collect::<Vec<_>>().join(", ")
+    }
+
+    /// The body around a call that writes the results: it makes the variables that the call takes, and returns what is
+    /// returned. Entries of arrays are `zero` before.
+    pub fn body(&self, runtime: &str, zero: &str, call: &str) -> String {
+        let line = |text: &str| format!("        {text}\n");
+        let structure = self.structure.as_ref().map_or(String::new(), |Structure { name, fields, .. }| {
+            let fields: Vec<&str> = fields.iter().map(|port| port.name).collect();
+            line(&format!("let {runtime}::{name} {{ {} }} = {STRUCTURE};", fields.join(", ")))
+        });
+        let [made, returned] = self.returned.as_ref().map_or_else(Default::default, |Port { name, dims, .. }| {
+            [line(&format!("let mut {name} = {};", nested(dims, zero))), line(name)]
+        });
+        format!("{structure}{made}{}{returned}", line(&format!("{call};")))
     }
 
     /// What the kernel reads, the arrays of which an input is used, and what it writes, in the order of the results.
@@ -145,7 +186,9 @@ impl Signature {
             }
             first = next;
         }
-        ports.extend(self.arguments.iter().filter(|port| port.written()).chain(&self.returned).cloned());
+        let fields = self.structure.iter().flat_map(|structure| &structure.fields);
+        let written = self.arguments.iter().filter(|port| port.written());
+        ports.extend(written.chain(fields).chain(&self.returned).cloned());
         ports
     }
 }
@@ -153,4 +196,61 @@ impl Signature {
 /// An array type, `[[f64; 6]; 2]` for `[2, 6]`; of a value, an array that holds it everywhere.
 pub fn nested(dims: &[usize], entry: &str) -> String {
     dims.iter().rev().fold(entry.to_string(), |inner, n| format!("[{inner}; {n}]"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::output::Output;
+
+    fn of(output: Output) -> Signature {
+        Signature::new(output.spec(), &Sizes::uniform(2))
+    }
+
+    #[test]
+    fn derivatives_are_fields_of_one_argument() {
+        assert_eq!(
+            of(Output::Derivatives).declaration("rt", "f64"),
+            "derivatives(&self, q: &[f64; 2], p: &[f64; 2], out: &mut rt::StateDerivatives<[f64; 2], [[f64; 2]; 2]>)"
+        );
+        assert_eq!(
+            of(Output::MomentumDerivatives).declaration("rt", "[f32; LANES]"),
+            "momentum_derivatives(&self, q: &[[f32; LANES]; 2], v: &[[f32; LANES]; 2], out: \
+             &mut rt::MomentumDerivatives<[[f32; LANES]; 2], [[[f32; LANES]; 2]; 2]>)"
+        );
+        assert_eq!(of(Output::Derivatives).names(), "q, p, out");
+        assert_eq!(
+            of(Output::MomentumDerivatives).body("rt", "0.0", "call(p, pd)"),
+            "        let rt::MomentumDerivatives { p, pd, dp_dq, dp_dv, dpd_dq, dpd_dv } = out;\n        call(p, pd);\n"
+        );
+    }
+
+    #[test]
+    fn shapes_are_parameters_of_the_type_even_where_their_lengths_are_one() {
+        let one = Signature::new(Output::Derivatives.spec(), &Sizes::uniform(1));
+        assert!(one.declaration("rt", "f64").ends_with("out: &mut rt::StateDerivatives<[f64; 1], [[f64; 1]; 1]>)"));
+    }
+
+    #[test]
+    fn other_results_are_arguments_or_returned() {
+        assert_eq!(
+            of(Output::Rates).declaration("rt", "f64"),
+            "rates(&self, q: &[f64; 2], p: &[f64; 2], qd: &mut [f64; 2], pd: &mut [f64; 2])"
+        );
+        let energy = of(Output::Energy);
+        assert_eq!(energy.declaration("rt", "f64"), "energy(&self, q: &[f64; 2], p: &[f64; 2]) -> [f64; 2]");
+        assert_eq!(
+            energy.body("rt", "0.0", "call(&mut energy)"),
+            "        let mut energy = [0.0; 2];\n        call(&mut energy);\n        energy\n"
+        );
+    }
+
+    #[test]
+    fn what_a_kernel_writes_does_not_depend_on_the_structure() {
+        for output in [Output::Derivatives, Output::MomentumDerivatives] {
+            let names: Vec<&str> = of(output).ports(&[], &BTreeSet::new()).iter().map(|port| port.name).collect();
+            let results: Vec<&str> = output.spec().results.iter().map(|array| array.name).collect();
+            assert_eq!(names, results);
+        }
+    }
 }

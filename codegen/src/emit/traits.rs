@@ -168,11 +168,7 @@ impl Writer<'_> {
         let items = [
             alias("Square", &square),
             method(&format!("square(&self) -> {square}"), &format!("[[0.0; {nv}]; {nv}]")),
-            method(
-                &format!("rate_derivatives(&mut self, {arguments})"),
-                "let d = out;\n        Self::derivatives(\n            self, q, p, &mut d.v, &mut d.pd, &mut d.dv_dq, &mut d.dv_dp, &mut d.dpd_dq, \
-                 &mut d.dpd_dp,\n        );",
-            ),
+            method(&format!("rate_derivatives(&mut self, {arguments})"), "Self::derivatives(self, q, p, out);"),
         ];
         self.implement("Differentiable", &items);
     }

@@ -26,6 +26,9 @@ const fn square(name: &'static str) -> Array {
     Array::new(name, &[Nv, Nv])
 }
 
+/// Name of the argument whose fields are the results of a function.
+pub const STRUCTURE: &str = "out";
+
 /// Fields of a generated type, in the order in which programs number them.
 pub const FIELDS: [Field; 8] = [
     Field::new("tau", &[Efforts], "Joint forces, N m or N, one for each velocity."),
@@ -125,12 +128,12 @@ outputs! {
     /// derivative. Joint forces add to `ṗ`: `∂ṗ/∂tau = 1`.
     Derivatives = Spec::new("derivatives", &[Q, P], &[
         V, PD, square("dv_dq"), square("dv_dp"), square("dpd_dq"), square("dpd_dp"),
-    ]);
+    ]).fields_of("StateDerivatives");
     /// Momenta, their rates at `v̇ = 0`, and derivatives of both with respect to `q` and `v`, by rows.
     /// Columns with respect to `q` are as in `derivatives`. `∂p/∂v` is the mass matrix.
     MomentumDerivatives = Spec::new("momentum_derivatives", &[Q, V], &[
         P, PD, square("dp_dq"), square("dp_dv"), square("dpd_dq"), square("dpd_dv"),
-    ]).only(WithoutConstraints);
+    ]).fields_of("MomentumDerivatives").only(WithoutConstraints);
     /// Derivatives of velocities and momentum rates with respect to the parameters, by rows.
     ParameterDerivatives = Spec::new("parameter_derivatives", &[Q, P], &[
         Array::new("dv_dparams", &[Nv, Params]),
@@ -198,11 +201,13 @@ mod tests {
         for output in Output::ALL {
             let spec = output.spec();
             let mut names: Vec<&str> = spec.inputs.iter().chain(spec.results).map(|array| array.name).collect();
+            assert!(!names.contains(&STRUCTURE), "{output:?}");
             names.sort_unstable();
             names.dedup();
             assert_eq!(names.len(), spec.inputs.len() + spec.results.len(), "{output:?}");
             assert_eq!(spec.inputs[0], Q, "{output:?}");
             assert!(!spec.returned || spec.results.len() == 1, "{output:?}");
+            assert!(!spec.returned || spec.structure.is_none(), "{output:?}");
         }
     }
 

@@ -163,6 +163,9 @@ pub struct Spec {
     pub results: &'static [Array],
     /// Whether the one result is returned; otherwise results are written to arguments.
     pub returned: bool,
+    /// A type of the runtime whose fields the results are in Rust, so that no two arrays can be exchanged: the one
+    /// argument that is written. Its parameters are the shapes of the results, each once, in the order of the results.
+    pub structure: Option<&'static str>,
     /// The models that have it.
     pub availability: Availability,
     /// The search that it uses.
@@ -173,11 +176,15 @@ impl Spec {
     /// An output of every model that writes its results.
     pub(super) const fn new(name: &'static str, inputs: &'static [Array], results: &'static [Array]) -> Spec {
         let (availability, search) = (Availability::Every, Search::Rates);
-        Spec { name, doc: "", inputs, results, returned: false, availability, search }
+        Spec { name, doc: "", inputs, results, returned: false, structure: None, availability, search }
     }
 
     pub(super) const fn returned(self) -> Spec {
         Spec { returned: true, ..self }
+    }
+
+    pub(super) const fn fields_of(self, structure: &'static str) -> Spec {
+        Spec { structure: Some(structure), ..self }
     }
 
     pub(super) const fn only(self, availability: Availability) -> Spec {
@@ -191,6 +198,17 @@ impl Spec {
     /// Lines of the documentation; the first stands for itself.
     pub fn doc(&self) -> impl Iterator<Item = &'static str> {
         self.doc.trim_end().lines().map(str::trim)
+    }
+
+    /// The shapes of the results, each once, in the order of the results.
+    pub fn shapes(&self) -> Vec<&'static [Dim]> {
+        let mut shapes = Vec::new();
+        for array in self.results {
+            if !shapes.contains(&array.dims) {
+                shapes.push(array.dims);
+            }
+        }
+        shapes
     }
 
     /// Whether it has one result for each chosen frame.

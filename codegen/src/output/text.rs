@@ -57,9 +57,10 @@ pub fn table() -> String {
             Availability::WithoutConstraints => " Not with loops or couplings.",
             Availability::WithContacts => " Only in code for the modes of contacts.",
         };
+        let fields = spec.structure.map_or(String::new(), |name| format!("fields of `{name}`: "));
         let inputs = names(spec.inputs.iter().map(|array| array.name));
         let (results, doc) = (results.collect::<Vec<_>>().join(", "), spec.doc().collect::<Vec<_>>().join(" "));
-        let _ = writeln!(out, "| `{}` | `{inputs}` | {results} | {doc}{only} |", spec.name);
+        let _ = writeln!(out, "| `{}` | `{inputs}` | {fields}{results} | {doc}{only} |", spec.name);
     }
     out
 }

@@ -35,7 +35,7 @@ mod solve;
 mod steps;
 mod touch;
 
-pub use derivatives::{Derivatives, MomentumDerivatives, ParameterDerivatives};
+pub use derivatives::{Derivatives, ParameterDerivatives};
 pub use kinematics::FrameState;
 pub use newton::Accelerations;
 

@@ -3,6 +3,7 @@
 #[allow(dead_code)]
 mod batch {
     use mbd_runtime::batch::RatesBatch;
+    use mbd_runtime::{MomentumDerivatives, StateDerivatives};
     use mbd_testing::state::State;
 
     /// Results by name, in a fixed order.
@@ -128,20 +129,18 @@ mod batch {
             $x.add("centroidal bias", &bias);
         };
         (derivatives, $x:ident) => {
-            let (mut v, mut pd, mut d) = ([0.0; NV], [0.0; NV], [[[0.0; NV]; NV]; 4]);
-            let [dv_dq, dv_dp, dpd_dq, dpd_dp] = &mut d;
-            $x.tree.derivatives(&$x.q, &$x.p, &mut v, &mut pd, dv_dq, dv_dp, dpd_dq, dpd_dp);
-            $x.add("v beside derivatives", &v);
-            $x.add("pd beside derivatives", &pd);
-            $x.add("derivatives", &d.concat().concat());
+            let mut d = StateDerivatives::zero();
+            $x.tree.derivatives(&$x.q, &$x.p, &mut d);
+            $x.add("v beside derivatives", &d.v);
+            $x.add("pd beside derivatives", &d.pd);
+            $x.add("derivatives", &[d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp].concat().concat());
         };
         (momentum_derivatives, $x:ident) => {
-            let (mut p, mut pd, mut d) = ([0.0; NV], [0.0; NV], [[[0.0; NV]; NV]; 4]);
-            let [dp_dq, dp_dv, dpd_dq, dpd_dv] = &mut d;
-            $x.tree.momentum_derivatives(&$x.q, &$x.v, &mut p, &mut pd, dp_dq, dp_dv, dpd_dq, dpd_dv);
-            $x.add("p beside derivatives", &p);
-            $x.add("pd beside derivatives, given v", &pd);
-            $x.add("momentum derivatives", &d.concat().concat());
+            let mut d = MomentumDerivatives::zero();
+            $x.tree.momentum_derivatives(&$x.q, &$x.v, &mut d);
+            $x.add("p beside derivatives", &d.p);
+            $x.add("pd beside derivatives, given v", &d.pd);
+            $x.add("momentum derivatives", &[d.dp_dq, d.dp_dv, d.dpd_dq, d.dpd_dv].concat().concat());
         };
         (parameter_derivatives, $x:ident) => {
             let (mut dv, mut dpd) = ([[0.0; PARAMS]; NV], [[0.0; PARAMS]; NV]);
@@ -238,8 +237,8 @@ mod batch {
 use batch::{Results, RUNNERS};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::{search, Output};
-use mbd_runtime::sweep::{Derivatives, FrameState, MomentumDerivatives, ParameterDerivatives};
-use mbd_runtime::{Interpreter, Scalar};
+use mbd_runtime::sweep::{Derivatives, FrameState, ParameterDerivatives};
+use mbd_runtime::{Interpreter, MomentumDerivatives, Scalar};
 use mbd_testing::assert_same_bits;
 use mbd_testing::batch::{is_single, tree, TREES};
 use mbd_testing::state::{parameter, random_state, State};

@@ -71,11 +71,10 @@ pub mod {name} {{
     const _: () = assert!(core::mem::size_of::<Kernel>() == {nv} * 8);
 
     /// # Safety
-    /// Pointers to {nq}, {nv}, {nv} and 4 × {block} + 2 × {nv} numbers.
+    /// Pointers to {nq}, {nv}, {nv} and 2 × {nv} + 4 × {block} numbers: the fields of `StateDerivatives`.
     #[no_mangle]
     pub unsafe extern \"C\" fn {name}_derivatives(q: *const f64, p: *const f64, tau: *const f64, out: *mut f64) {{
-        let block = |k: usize| &mut *out.add(k * {block}).cast();
-        (*tau.cast::<Kernel>()).derivatives(&*q.cast(), &*p.cast(), &mut *out.add(4 * {block}).cast(), &mut *out.add(4 * {block} + {nv}).cast(), block(0), block(1), block(2), block(3));
+        (*tau.cast::<Kernel>()).derivatives(&*q.cast(), &*p.cast(), &mut *out.cast());
     }}
 
     /// Where our coordinates and velocities stand in Pinocchio's state; operations.

@@ -1,9 +1,12 @@
 //! `M = LᵀDL`, solutions with it, and the four blocks put together.
 
+use alloc::vec::Vec;
+
 use super::order::{Across, Meeting, Order};
 use super::pairs::{add, bracket, own_motion};
-use super::{velocity, Derivatives, MomentumDerivatives};
+use super::{velocity, Derivatives};
 use crate::sweep::{Quantity, Sweeps, Trace};
+use crate::system::MomentumDerivatives;
 use crate::tree::Node;
 use crate::Scalar;
 
@@ -142,7 +145,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// `p`, and the blocks at given velocities: `∂p/∂v = M`, `∂p/∂q = B`, `∂ṗ/∂v = Bᵀ + G + ad(v) M`,
     /// `∂ṗ/∂q = C + ad(v) B`; `M` and `C` are in place, the rest goes into `out`.
-    pub(super) fn assemble_momentum(&self, d: &Derivatives<S>, out: &mut MomentumDerivatives<S>) {
+    pub(super) fn assemble_momentum(&self, d: &Derivatives<S>, out: &mut MomentumDerivatives<Vec<S>, Vec<S>>) {
         let nv = self.tree.dims.nv;
         self.trace.at(None, Quantity::Derivative);
         for a in 0..nv {

@@ -38,9 +38,12 @@ mod room;
 mod wrench;
 
 pub use parameters::ParameterDerivatives;
-pub use room::{Derivatives, MomentumDerivatives};
+pub use room::Derivatives;
+
+use alloc::vec::Vec;
 
 use super::{Inputs, Sweeps, Trace};
+use crate::system::MomentumDerivatives;
 use crate::tree::{Node, Source};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -72,7 +75,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         u: &Inputs<S>,
         w: &mut Workspace<S>,
         d: &mut Derivatives<S>,
-        out: &mut MomentumDerivatives<S>,
+        out: &mut MomentumDerivatives<Vec<S>, Vec<S>>,
     ) {
         self.articulate(q, u.drive_q, &mut w.poses);
         d.begin();

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 
 use super::order::Order;
 use crate::spatial::{Force, Motion, RigidInertia, Vec3};
+use crate::system::MomentumDerivatives;
 use crate::tree::Tree;
 use crate::Scalar;
 
@@ -64,24 +65,7 @@ pub struct Derivatives<S> {
     pub(super) fall: Vec<Vec3<S>>,
 }
 
-/// Momenta and their rates at given velocities with their derivatives, `nv × nv` each, row by row.
-#[derive(Clone, Debug)]
-pub struct MomentumDerivatives<S> {
-    /// Momenta at `(q, v)`.
-    pub p: Vec<S>,
-    /// Momentum rates, accelerations not entering.
-    pub pd: Vec<S>,
-    /// `∂p/∂q`.
-    pub dp_dq: Vec<S>,
-    /// `∂p/∂v`, the mass matrix.
-    pub dp_dv: Vec<S>,
-    /// `∂ṗ/∂q`.
-    pub dpd_dq: Vec<S>,
-    /// `∂ṗ/∂v`.
-    pub dpd_dv: Vec<S>,
-}
-
-impl<S: Scalar> MomentumDerivatives<S> {
+impl<S: Scalar> MomentumDerivatives<Vec<S>, Vec<S>> {
     /// Allocates memory for a tree; nothing is allocated later.
     pub fn new(tree: &Tree<S>) -> Self {
         let (o, nv) = (S::zero(), tree.dims.nv);
