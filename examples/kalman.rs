@@ -7,10 +7,12 @@
 
 // The program that tests all examples has it from `mpc` too.
 #[allow(clippy::duplicate_mod)]
+// What costs weigh is not used: a filter has no costs.
+#[allow(dead_code)]
 #[path = "mpc/steps.rs"]
 mod steps;
 
-use multibody::runtime::{Differentiable, Real, StateDerivatives};
+use multibody::runtime::{Differentiable, Real};
 use nalgebra::{SMatrix, SVector};
 use steps::{Dynamics, Steps};
 

@@ -63,7 +63,7 @@ mod made {
 
 #[test]
 fn types_are_made_of_models_of_mujoco() {
-    let mut rod = made::Pendulum::new();
+    let rod = made::Pendulum::new();
     let [kinetic, potential] = rod.energy(&[0.0], &[0.0]);
     assert!(kinetic == 0.0 && (potential + 9.81).abs() < 1e-14, "{potential}");
     assert_eq!((made::HoppingLeg::NQ, made::HoppingLeg::Q_KNEE), (6, 4));
