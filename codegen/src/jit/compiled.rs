@@ -11,7 +11,7 @@ use super::CompileError;
 use crate::code::{compile, Code};
 use crate::model::{Gravity, Model};
 use crate::options::Options;
-use crate::output::{Output, OutputProgram, Sizes, Spec};
+use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
 use crate::rolled::rolled;
 use crate::search;
@@ -219,8 +219,7 @@ impl<S: Number> Compiled<S> {
         results: &mut [&mut [S]],
     ) -> Result<(), CompileError> {
         let code = self.shared.output(output).map_err(CompileError::clone)?;
-        check(output.spec(), &self.shared.sizes, arguments, results)
-            .map_err(|words| CompileError::Arrays { output, words })?;
+        self.check_arrays(output, arguments, results)?;
         let given = |k: usize| arguments.get(k).copied().unwrap_or_default();
         let scratch = long_enough(&mut self.scratch, code);
         call(code, [given(0), given(1), given(2)], (&self.interpreter, &self.params, &self.acts), results, scratch);
@@ -383,18 +382,4 @@ fn call<S: Number>(
     let given: [&[S]; INPUTS] =
         [a, b, c, tau, drive_q, drive_v, drive_a, wrenches.as_flattened(), params, acts, gravity];
     code.call(&given, results, scratch);
-}
-
-/// Compares the lengths of arguments and results with those of an output.
-fn check<S>(spec: &Spec, sizes: &Sizes, arguments: &[&[S]], results: &[&mut [S]]) -> Result<(), String> {
-    let lengths = |arrays: &[crate::output::Array]| arrays.iter().map(|a| a.len(sizes)).collect::<Vec<_>>();
-    let given = [arguments.iter().map(|a| a.len()).collect(), results.iter().map(|r| r.len()).collect::<Vec<_>>()];
-    for (name, given, expected) in
-        [("arguments", &given[0], lengths(spec.inputs)), ("results", &given[1], lengths(spec.results))]
-    {
-        if *given != expected {
-            return Err(format!("its {name} have the lengths {expected:?}, and {given:?} were given"));
-        }
-    }
-    Ok(())
 }

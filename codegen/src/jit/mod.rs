@@ -24,6 +24,7 @@
 mod compiled;
 mod error;
 mod instructions;
+mod interpreted;
 mod memory;
 mod traits;
 
