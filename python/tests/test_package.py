@@ -1,5 +1,6 @@
 """The stubs, the documentation, the environments."""
 
+import importlib.util
 import inspect
 import pathlib
 import re
@@ -34,6 +35,13 @@ def test_every_public_name_is_documented_and_in_the_stubs():
         assert inspect.getdoc(getattr(multibody.gym, name)), name
         assert re.search(rf"^(def|class) {name}\b", gym, re.M), name
     assert (PACKAGE / "py.typed").exists()
+
+
+def test_the_stubs_are_those_of_the_table():
+    specification = importlib.util.spec_from_file_location("make_stubs", REPOSITORY / "python" / "make_stubs.py")
+    make_stubs = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(make_stubs)
+    assert make_stubs.text() == (PACKAGE / "__init__.pyi").read_text()
 
 
 def test_outputs_are_methods_with_shapes_in_their_documentation():
