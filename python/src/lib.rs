@@ -2,11 +2,13 @@
 //! of mechanics is computed here.
 
 mod arrays;
+mod driver;
 mod errors;
 mod evaluate;
 mod generate;
 mod machines;
 mod model;
+mod pairs;
 mod read;
 mod rollout;
 mod rows;

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use multibody::codegen::jit::{CompileError, Compiled};
+use multibody::codegen::jit::{CompileError, Compiled, CompiledLanes};
 use multibody::codegen::model::{Gravity, Model};
 use multibody::codegen::output::{Output, Sizes, FIELDS};
 use multibody::codegen::Options;
@@ -65,6 +65,11 @@ impl Machines {
         fields.for_each(|field| set(&mut machine, field, &self.defaults[field]));
         machine.inputs().tau.fill(0.0);
         self.pool.lock().unwrap_or_else(PoisonError::into_inner).push(machine);
+    }
+
+    /// Several states at once, if the model is not too large for that.
+    pub fn lanes(&self) -> Option<CompiledLanes> {
+        self.template.lanes().ok()
     }
 
     /// Compiles an output, if it is not yet.

@@ -2,12 +2,11 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use multibody::codegen::jit::Compiled;
+use multibody::codegen::jit::{Compiled, CompiledLanes, LANES};
 use multibody::codegen::output::Output;
 use multibody::codegen::plan::state_layout;
-use multibody::runtime::catalogue::{self, BoxedMethod};
-use multibody::runtime::constrained::{Effort, Projection, Stabilisation, WithPostStep};
-use multibody::runtime::integrate::{Solver, Step, StepError, Stepper, Tolerances};
+use multibody::runtime::catalogue;
+use multibody::runtime::integrate::StepError;
 use multibody::runtime::layout::Layout;
 use multibody::runtime::{Conjugate, Constrained, System};
 use numpy::PyArrayDyn;
@@ -16,15 +15,15 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::{result, writable, Given, Rows};
+use crate::driver::Driver;
 use crate::errors::{about_model, compile_error, Failed};
 use crate::machines::{set, Inputs, Machines};
 use crate::model::Model;
+use crate::pairs;
 use crate::rows::{on_threads, Beat};
 
 /// Residual up to which the loops of a start count as closed, m or rad.
 const OPEN: f64 = 1e-6;
-/// Steps of an adaptive method between two rows of the result.
-const MOST_STEPS: u64 = 1_000_000;
 
 /// Coordinates, velocities or momenta, failures.
 pub type Results<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyList>);
@@ -33,12 +32,12 @@ pub type Results<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Settings {
-    dt: f64,
-    steps: usize,
-    every: usize,
-    method: String,
-    tolerance: Option<f64>,
-    momenta: bool,
+    pub dt: f64,
+    pub steps: usize,
+    pub every: usize,
+    pub method: String,
+    pub tolerance: Option<f64>,
+    pub momenta: bool,
     layout: String,
     threads: Option<usize>,
 }
@@ -140,25 +139,25 @@ pub fn rollout<'py>(
 }
 
 /// What all rows have in common.
-struct Motion<'a> {
-    settings: &'a Settings,
-    layout: Option<&'a Layout>,
+pub struct Motion<'a> {
+    pub settings: &'a Settings,
+    pub layout: Option<&'a Layout>,
     /// Numbers of coordinates and velocities there.
-    sizes: (usize, usize),
+    pub sizes: (usize, usize),
     start: (Rows<'a>, Rows<'a>),
-    u: Option<Rows<'a>>,
-    fields: Vec<(usize, Rows<'a>)>,
+    pub u: Option<Rows<'a>>,
+    pub fields: Vec<(usize, Rows<'a>)>,
 }
 
 /// The state of a row, and memory.
-struct State {
-    q: Vec<f64>,
-    p: Vec<f64>,
-    v: Vec<f64>,
+pub struct State {
+    pub q: Vec<f64>,
+    pub p: Vec<f64>,
+    pub v: Vec<f64>,
 }
 
 /// A row and the memory of its results.
-type Item<'a> = (usize, &'a mut [f64], &'a mut [f64]);
+pub type Item<'a> = (usize, &'a mut [f64], &'a mut [f64]);
 
 impl Motion<'_> {
     /// Computes all rows; returns the failures, in the order of the rows.
@@ -170,13 +169,23 @@ impl Motion<'_> {
         (q, v): (&mut [f64], &mut [f64]),
     ) -> PyResult<Vec<(usize, Failed)>> {
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-        let threads = self.settings.threads.unwrap_or_else(cores).min(rows).max(1);
+        let lanes = match self.at_once(machines, rows) {
+            true => py.detach(|| machines.lanes()),
+            false => None,
+        };
+        let width = if lanes.is_some() { LANES } else { 1 };
+        let threads = self.settings.threads.unwrap_or_else(cores).min(rows.div_ceil(width)).max(1);
         let failures = Mutex::new(Vec::new());
         py.detach(|| {
-            let items = cut(q, rows).zip(cut(v, rows)).enumerate().map(|(k, (q, v))| (k, q, v));
-            let end = |machine: Compiled| machines.give_back(machine, self.fields.iter().map(|(field, _)| *field));
-            on_threads(items, threads, || machines.take(), end, |machine, (k, q, v): Item, beat| {
-                if let Err(failed) = self.row(machine, k, q, v, beat) {
+            let mut items = cut(q, rows).zip(cut(v, rows)).enumerate().map(|(k, (q, v))| (k, q, v));
+            let blocks = std::iter::from_fn(|| {
+                let block: Vec<Item> = items.by_ref().take(width).collect();
+                (!block.is_empty()).then_some(block)
+            });
+            let begin = || (machines.take(), lanes.clone());
+            let end = |(machine, _)| machines.give_back(machine, self.fields.iter().map(|(field, _)| *field));
+            on_threads(blocks, threads, begin, end, |(machine, lanes), block: Vec<Item>, beat| {
+                for (k, failed) in self.block(machine, lanes.as_mut(), block, beat) {
                     failures.lock().unwrap_or_else(PoisonError::into_inner).push((k, failed));
                 }
             })
@@ -184,6 +193,46 @@ impl Motion<'_> {
         let mut failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
         failures.sort_by_key(|(k, _)| *k);
         Ok(failures)
+    }
+
+    /// Whether rows can be computed several at once.
+    fn at_once(&self, machines: &Machines, rows: usize) -> bool {
+        let Settings { method, tolerance, .. } = self.settings;
+        rows >= LANES && machines.sizes().rows == 0 && pairs::possible(method, *tolerance)
+    }
+
+    /// Computes some rows, at once if possible; returns those that fail.
+    fn block(
+        &self,
+        machine: &mut Compiled,
+        lanes: Option<&mut CompiledLanes>,
+        block: Vec<Item>,
+        beat: &mut Beat,
+    ) -> Vec<(usize, Failed)> {
+        let left = match (lanes, <[Item; LANES]>::try_from(block)) {
+            (Some(lanes), Ok(mut items)) => {
+                if self.rows_at_once((machine, lanes), &mut items, beat).is_some() {
+                    return Vec::new();
+                }
+                items.into()
+            }
+            (_, Ok(items)) => items.into(),
+            (_, Err(block)) => block,
+        };
+        let one = |(k, q, v): Item| self.row(machine, k, q, v, beat).err().map(|failed| (k, failed));
+        left.into_iter().filter_map(one).collect()
+    }
+
+    /// Refuses quaternions that are not of unit length.
+    pub fn check_units(&self, machine: &Compiled, q: &[f64]) -> Result<(), StepError> {
+        for index in machine.quaternions() {
+            let norm = q[index..index + 4].iter().map(|x| x * x).sum::<f64>();
+            // Those near the limit are judged by the method itself.
+            if !(0.999..1.001).contains(&norm) {
+                return Err(StepError::Quaternion { time: 0.0, index, norm: norm.sqrt() });
+            }
+        }
+        Ok(())
     }
 
     /// Computes one row. After a failure the rest of it is not a number.
@@ -245,7 +294,7 @@ impl Motion<'_> {
     }
 
     /// The state at the start of a row.
-    fn begin(&self, machine: &mut Compiled, k: usize) -> Result<State, Failed> {
+    pub fn begin(&self, machine: &mut Compiled, k: usize) -> Result<State, Failed> {
         let (q_there, v_there) = (self.start.0.row(k), self.start.1.row(k));
         let (mut q, mut second) = (machine.neutral(), machine.zero_momenta());
         match self.layout {
@@ -316,67 +365,4 @@ fn closed(machine: &mut Compiled, q: &Vec<f64>) -> Result<(), Failed> {
 
 fn failed(machine: &Compiled, error: &StepError) -> Failed {
     Failed::step(error, error.named(machine).to_string())
-}
-
-/// A method with fixed steps, or one that chooses them.
-enum Driver {
-    Fixed(BoxedMethod<'static, Compiled>),
-    Adaptive(Box<Solver<Compiled, BoxedMethod<'static, Compiled>>>),
-}
-
-impl Driver {
-    fn new(settings: &Settings, machine: &mut Compiled, state: &State) -> Result<Driver, StepError> {
-        let tolerances = settings.tolerance.map(Tolerances::new);
-        let no_method = StepError::NoEstimate { time: 0.0 };
-        let mut method = catalogue::any(&settings.method, machine, false).ok_or(no_method)?;
-        if !machine.rows().is_empty() {
-            let effort = settings.tolerance.map_or_else(Effort::default, Effort::within);
-            let hold = Projection::new(machine, Stabilisation::default(), effort);
-            method = Box::new(WithPostStep::new(machine, method, hold));
-        }
-        Ok(match tolerances {
-            None => Driver::Fixed(method),
-            Some(tolerances) => {
-                let step = Step::Adaptive(tolerances);
-                Driver::Adaptive(Box::new(Solver::new(machine, method, step, 0.0, &state.q, &state.p)?))
-            }
-        })
-    }
-
-    /// Goes on by one step of the settings, with new joint forces where these are `driven`. Returns whether to go on.
-    fn step(
-        &mut self,
-        settings: &Settings,
-        machine: &mut Compiled,
-        step: usize,
-        driven: bool,
-        state: &mut State,
-        beat: &mut Beat,
-    ) -> Result<bool, StepError> {
-        let (t, end) = (step as f64 * settings.dt, (step + 1) as f64 * settings.dt);
-        match self {
-            Driver::Fixed(method) => {
-                method.step(machine, t, settings.dt, &mut state.q, &mut state.p)?;
-                Ok(beat.goes_on())
-            }
-            Driver::Adaptive(solver) => {
-                if driven && step > 0 {
-                    solver.resume(machine, t, &state.q, &state.p)?;
-                }
-                let mut steps = 0;
-                while solver.time() < end {
-                    if steps == MOST_STEPS {
-                        return Err(StepError::TooManySteps { time: solver.time(), steps });
-                    }
-                    steps += 1;
-                    solver.advance(machine, end)?;
-                    if !beat.goes_on() {
-                        return Ok(false);
-                    }
-                }
-                solver.state(machine, &mut state.q, &mut state.p);
-                Ok(true)
-            }
-        }
-    }
 }
