@@ -18,7 +18,7 @@ from mujoco import rollout as mujoco_rollout
 import multibody
 
 MODELS = pathlib.Path(__file__).resolve().parents[2] / "models"
-DT, STEPS, ROWS = 1e-3, 100, 64
+DT, STEPS, ROWS = 1e-3, 500, 16
 
 
 def bare_urdf(name):

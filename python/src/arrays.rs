@@ -46,7 +46,8 @@ fn doubles<'py>(object: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, P
         }
     }
     let numpy = object.py().import("numpy")?;
-    let refused = |what: &str| PyTypeError::new_err(format!("`{name}` {what}: give numbers, as a NumPy array of float64"));
+    let refused =
+        |what: &str| PyTypeError::new_err(format!("`{name}` {what}: give numbers, as a NumPy array of float64"));
     let array = numpy.call_method1("asarray", (object,)).map_err(|_| refused("is no array"))?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     if !["b", "i", "u", "f"].contains(&kind.as_str()) {

@@ -85,18 +85,14 @@ impl Failed {
     pub fn step(error: &StepError, message: String) -> Failed {
         let (kind, numbers) = match *error {
             StepError::NotFinite { index, .. } => ("not_finite", vec![("index", index as f64)]),
-            StepError::Quaternion { index, norm, .. } => {
-                ("quaternion", vec![("index", index as f64), ("norm", norm)])
-            }
+            StepError::Quaternion { index, norm, .. } => ("quaternion", vec![("index", index as f64), ("norm", norm)]),
             StepError::StepTooSmall { step, error, .. } => ("step_too_small", vec![("step", step), ("error", error)]),
             StepError::NoEstimate { .. } => ("no_estimate", vec![]),
             StepError::TooManySteps { steps, .. } => ("too_many_steps", vec![("steps", steps as f64)]),
             StepError::NoConvergence { step, iterations, change, .. } => {
                 ("no_convergence", vec![("step", step), ("iterations", iterations.into()), ("change", change)])
             }
-            StepError::Singular { step, column, .. } => {
-                ("singular", vec![("step", step), ("column", column as f64)])
-            }
+            StepError::Singular { step, column, .. } => ("singular", vec![("step", step), ("column", column as f64)]),
             StepError::Constraint { error, .. } => ("constraint", constraint_numbers(&error)),
             _ => ("failed", vec![]),
         };

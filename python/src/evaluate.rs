@@ -62,7 +62,8 @@ pub fn evaluate<'py>(
         let count = batch.unwrap_or(1);
         let mut machine = machines.take();
         let work = Work { output, arguments: &arguments, fields: &fields, count };
-        let done = if count < MANY { work.run(&mut machine, slices) } else { py.detach(|| work.run(&mut machine, slices)) };
+        let done =
+            if count < MANY { work.run(&mut machine, slices) } else { py.detach(|| work.run(&mut machine, slices)) };
         machines.give_back(machine, inputs.0.iter().map(|(field, _)| *field));
         done.map_err(|e| compile_error(py, &e))?;
     }

@@ -127,7 +127,8 @@ impl<S: Number> Compiled<S> {
         let params: Vec<S> = plan.default_params().into_iter().map(S::constant).collect();
         let interpreter = plan.interpreter(&params);
         let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
-        let shared = Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new(), lanes: OnceLock::new() };
+        let shared =
+            Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new(), lanes: OnceLock::new() };
         let (acts, shared) = (vec![S::one(); sizes.acts], Arc::new(shared));
         let (scratch, copies) = (Vec::new(), Vec::new());
         Ok(Compiled {
@@ -310,7 +311,8 @@ impl<S: Number> Compiled<S> {
         let plan = plan.acting(acts);
         let interpreter = self.interpreter.acting(acts);
         let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
-        let shared = Shared { plan, options, sizes: *sizes, outputs, coordinate_rates: OnceLock::new(), lanes: OnceLock::new() };
+        let shared =
+            Shared { plan, options, sizes: *sizes, outputs, coordinate_rates: OnceLock::new(), lanes: OnceLock::new() };
         Compiled { shared: Arc::new(shared), interpreter, calls: vec![0; self.calls.len()], ..self.clone() }
     }
 

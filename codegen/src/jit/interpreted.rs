@@ -39,8 +39,7 @@ impl<S: Number> Compiled<S> {
         arguments: &[&[S]],
         results: &[&mut [S]],
     ) -> Result<(), CompileError> {
-        check(output.spec(), self.sizes(), arguments, results)
-            .map_err(|words| CompileError::Arrays { output, words })
+        check(output.spec(), self.sizes(), arguments, results).map_err(|words| CompileError::Arrays { output, words })
     }
 }
 
