@@ -130,6 +130,7 @@ def rollout(
         ``dt``: step, s. Methods that choose their steps give a state after every ``dt``.
         ``steps``: number ``T`` of steps; that of ``u`` if it is given.
         ``method``: one of ``multibody.methods()``; ``"rk4"`` without a tolerance, ``"dop853"`` with one.
+            Models with contacts take these two alone.
         ``tolerance``: error that a step may have (rad and m for coordinates, relative for momenta): adaptive steps.
         ``state``: ``"velocities"`` or ``"momenta"``: what the second half of ``x0`` and of the result holds.
         ``layout``: order and representation of states and ``u``: ``"mbd"``, ``"pinocchio"`` or ``"mujoco"``.

@@ -2,6 +2,7 @@
 //! of mechanics is computed here.
 
 mod arrays;
+mod contacts;
 mod driver;
 mod errors;
 mod evaluate;

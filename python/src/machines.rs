@@ -1,7 +1,7 @@
 //! Machine code of a model, with working memory for as many callers as there are at once.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use multibody::codegen::jit::{CompileError, Compiled, CompiledLanes};
 use multibody::codegen::model::{Gravity, Model};
@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{batch, Given};
+use crate::contacts::Touching;
 
 /// Gravity where it is an input and nobody gives it, m/s²: the default of generated code.
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
@@ -22,6 +23,9 @@ pub struct Machines {
     /// Of each of [`FIELDS`], what is given where a call gives nothing.
     defaults: Vec<Vec<f64>>,
     pool: Mutex<Vec<Compiled>>,
+    options: Options,
+    /// With its contacts, made when they are first followed.
+    touching: OnceLock<Result<Touching, CompileError>>,
     /// A bit for each output whose code is there.
     prepared: AtomicU64,
 }
@@ -46,7 +50,14 @@ impl Machines {
             _ => Vec::new(),
         };
         let defaults = FIELDS.iter().map(|field| default(field.array.name)).collect();
-        Ok(Machines { defaults, template, pool: Mutex::default(), prepared: AtomicU64::new(0) })
+        Ok(Machines {
+            defaults,
+            template,
+            pool: Mutex::default(),
+            options: options.clone(),
+            touching: OnceLock::new(),
+            prepared: AtomicU64::new(0),
+        })
     }
 
     /// Lengths of all arrays.
@@ -70,6 +81,13 @@ impl Machines {
     /// Several states at once, if the model is not too large for that.
     pub fn lanes(&self) -> Option<CompiledLanes> {
         self.template.lanes().ok()
+    }
+
+    /// The mechanism with its contacts, for rollouts.
+    pub fn touching(&self) -> Result<Touching, CompileError> {
+        let gravity = self.template.clone().inputs().gravity;
+        let make = || Touching::new(self.template.plan(), &self.options, gravity);
+        self.touching.get_or_init(make).clone()
     }
 
     /// Compiles an output, if it is not yet.

@@ -15,8 +15,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::{result, writable, Given, Rows};
+use crate::contacts::{self, Touching};
 use crate::driver::Driver;
-use crate::errors::{about_model, compile_error, Failed};
+use crate::errors::{compile_error, Failed};
 use crate::machines::{set, Inputs, Machines};
 use crate::model::Model;
 use crate::pairs;
@@ -96,15 +97,21 @@ pub fn rollout<'py>(
     out: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
 ) -> PyResult<Results<'py>> {
     settings.check()?;
-    if !model.description.contacts.is_empty() {
-        let words = "the model has contacts, which rollouts do not follow yet: simulate it with the command `mbd simulate`, or \
-                     describe it without them";
-        return Err(about_model(py, words));
+    let touches = !model.description.contacts.is_empty();
+    if touches && !contacts::METHODS.contains(&&settings.method[..]) {
+        let (method, names) = (&settings.method, contacts::METHODS.join(" or "));
+        return Err(PyValueError::new_err(format!(
+            "`{method}` does not follow the contacts of the model: take {names}"
+        )));
     }
     let (layout, machines) = (settings.layout(model)?, model.machines(py)?);
     for output in [Output::Rates, Output::Velocities, Output::Momenta] {
         machines.prepare(py, output).map_err(|e| compile_error(py, &e))?;
     }
+    let touching = match touches {
+        true => Some(py.detach(|| machines.touching()).map_err(|e| compile_error(py, &e))?),
+        false => None,
+    };
     let dims = model.plan.dims;
     let (nq, nv) = layout.as_ref().map_or((dims.nq, dims.nv), Layout::sizes);
     let second = if settings.momenta { "p0" } else { "v0" };
@@ -128,6 +135,7 @@ pub fn rollout<'py>(
             start: (q0.rows()?, v0.rows()?),
             u: u.as_ref().map(Given::rows).transpose()?,
             fields,
+            touching,
         };
         motion.all(py, machines, batch.unwrap_or(1), (q_all, v_all))?
     };
@@ -147,6 +155,8 @@ pub struct Motion<'a> {
     start: (Rows<'a>, Rows<'a>),
     pub u: Option<Rows<'a>>,
     pub fields: Vec<(usize, Rows<'a>)>,
+    /// For models with contacts.
+    touching: Option<Touching>,
 }
 
 /// The state of a row, and memory.
@@ -154,6 +164,13 @@ pub struct State {
     pub q: Vec<f64>,
     pub p: Vec<f64>,
     pub v: Vec<f64>,
+}
+
+/// What a thread works with.
+struct Memory {
+    machine: Compiled,
+    lanes: Option<CompiledLanes>,
+    touching: Option<Touching>,
 }
 
 /// A row and the memory of its results.
@@ -182,10 +199,12 @@ impl Motion<'_> {
                 let block: Vec<Item> = items.by_ref().take(width).collect();
                 (!block.is_empty()).then_some(block)
             });
-            let begin = || (machines.take(), lanes.clone());
-            let end = |(machine, _)| machines.give_back(machine, self.fields.iter().map(|(field, _)| *field));
-            on_threads(blocks, threads, begin, end, |(machine, lanes), block: Vec<Item>, beat| {
-                for (k, failed) in self.block(machine, lanes.as_mut(), block, beat) {
+            let begin = || Memory { machine: machines.take(), lanes: lanes.clone(), touching: self.touching.clone() };
+            let end = |memory: Memory| {
+                machines.give_back(memory.machine, self.fields.iter().map(|(field, _)| *field));
+            };
+            on_threads(blocks, threads, begin, end, |memory, block: Vec<Item>, beat| {
+                for (k, failed) in self.block(memory, block, beat) {
                     failures.lock().unwrap_or_else(PoisonError::into_inner).push((k, failed));
                 }
             })
@@ -198,20 +217,14 @@ impl Motion<'_> {
     /// Whether rows can be computed several at once.
     fn at_once(&self, machines: &Machines, rows: usize) -> bool {
         let Settings { method, tolerance, .. } = self.settings;
-        rows >= LANES && machines.sizes().rows == 0 && pairs::possible(method, *tolerance)
+        rows >= LANES && self.touching.is_none() && machines.sizes().rows == 0 && pairs::possible(method, *tolerance)
     }
 
     /// Computes some rows, at once if possible; returns those that fail.
-    fn block(
-        &self,
-        machine: &mut Compiled,
-        lanes: Option<&mut CompiledLanes>,
-        block: Vec<Item>,
-        beat: &mut Beat,
-    ) -> Vec<(usize, Failed)> {
-        let left = match (lanes, <[Item; LANES]>::try_from(block)) {
+    fn block(&self, memory: &mut Memory, block: Vec<Item>, beat: &mut Beat) -> Vec<(usize, Failed)> {
+        let left = match (&mut memory.lanes, <[Item; LANES]>::try_from(block)) {
             (Some(lanes), Ok(mut items)) => {
-                if self.rows_at_once((machine, lanes), &mut items, beat).is_some() {
+                if self.rows_at_once((&mut memory.machine, lanes), &mut items, beat).is_some() {
                     return Vec::new();
                 }
                 items.into()
@@ -219,8 +232,8 @@ impl Motion<'_> {
             (_, Ok(items)) => items.into(),
             (_, Err(block)) => block,
         };
-        let one = |(k, q, v): Item| self.row(machine, k, q, v, beat).err().map(|failed| (k, failed));
-        left.into_iter().filter_map(one).collect()
+        let one = |item: Item| (item.0, self.row(memory, item, beat));
+        left.into_iter().map(one).filter_map(|(k, done)| Some((k, done.err()?))).collect()
     }
 
     /// Refuses quaternions that are not of unit length.
@@ -236,18 +249,16 @@ impl Motion<'_> {
     }
 
     /// Computes one row. After a failure the rest of it is not a number.
-    fn row(
-        &self,
-        machine: &mut Compiled,
-        k: usize,
-        q: &mut [f64],
-        v: &mut [f64],
-        beat: &mut Beat,
-    ) -> Result<(), Failed> {
-        self.fields.iter().for_each(|(field, rows)| set(machine, *field, rows.row(k)));
+    fn row(&self, memory: &mut Memory, mut item: Item, beat: &mut Beat) -> Result<(), Failed> {
+        let Memory { machine, touching, .. } = memory;
+        self.fields.iter().for_each(|(field, rows)| set(machine, *field, rows.row(item.0)));
         machine.inputs().tau.fill(0.0);
         let mut written = 0;
-        let done = self.motion(machine, k, (q, v), &mut written, beat);
+        let done = match touching {
+            Some(touching) => self.row_with_contacts(machine, touching, &mut item, &mut written, beat),
+            None => self.motion(machine, &mut item, &mut written, beat),
+        };
+        let (_, q, v) = item;
         let (nq, nv) = self.sizes;
         if written * nq < q.len() {
             q[written * nq..].fill(f64::NAN);
@@ -259,14 +270,13 @@ impl Motion<'_> {
     fn motion(
         &self,
         machine: &mut Compiled,
-        k: usize,
-        (q, v): (&mut [f64], &mut [f64]),
+        (k, q, v): &mut Item,
         written: &mut usize,
         beat: &mut Beat,
     ) -> Result<(), Failed> {
-        let mut state = self.begin(machine, k)?;
+        let mut state = self.begin(machine, *k)?;
         let mut driver = Driver::new(self.settings, machine, &state).map_err(|e| failed(machine, &e))?;
-        let u = self.u.map(|u| u.row(k));
+        let u = self.u.map(|u| u.row(*k));
         let (nq, nv) = self.sizes;
         for step in 0..=self.settings.steps {
             if step % self.settings.every == 0 {
@@ -324,7 +334,7 @@ impl Motion<'_> {
     }
 
     /// Writes the state as a row of the result.
-    fn store(&self, machine: &mut Compiled, state: &mut State, q: &mut [f64], v: &mut [f64]) {
+    pub fn store(&self, machine: &mut Compiled, state: &mut State, q: &mut [f64], v: &mut [f64]) {
         if !self.settings.momenta {
             machine.velocities(&state.q, &state.p, &mut state.v);
         }

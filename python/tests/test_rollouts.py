@@ -139,11 +139,45 @@ def test_loops_stay_closed(linkage):
     assert abs(linkage.constraint_residuals(motion.q).residual).max() < 1e-11
 
 
-def test_contacts_are_never_left_out_silently():
-    model = multibody.load(MODELS / "contacts" / "bouncing_ball.toml")
-    assert model.contact_names
-    with pytest.raises(multibody.ModelError, match="contacts"):
-        model.rollout(model.start(), dt=1e-3, steps=5)
+def test_contacts_are_followed():
+    ball = multibody.load(MODELS / "contacts" / "bouncing_ball.toml")
+    assert ball.contact_names
+    with pytest.raises(ValueError, match="`rk4-doubling` does not follow the contacts"):
+        ball.rollout(ball.start(), dt=1e-3, steps=5, method="rk4-doubling")
+    q, v = ball.start()
+    q, v = np.stack([q, q, q]), np.stack([v, v, v])
+    v[1, 0] = 0.3
+    one = ball.rollout((q, v), dt=5e-3, steps=300, tolerance=1e-9, threads=1)
+    two = ball.rollout((q, v), dt=5e-3, steps=300, tolerance=1e-9, threads=2)
+    assert (one.q == two.q).all() and (one.q[0] == one.q[2]).all()
+    alone = ball.rollout((q[1], v[1]), dt=5e-3, steps=300, tolerance=1e-9)
+    assert (alone.q == one.q[1]).all()
+    # It falls 1 m and bounces with 0.8 of its speed.
+    fall = np.sqrt(2 / 9.81)
+    height, time = one.q[0, :, 2], 5e-3 * np.arange(301)
+    assert height.min() > 0.05 - 1e-9
+    up = (time > fall) & (time < fall * (1 + 2 * 0.8))
+    expected = 0.05 + 0.8 * fall * 9.81 * (time - fall) - 0.5 * 9.81 * (time - fall) ** 2
+    np.testing.assert_allclose(height[up], expected[up], atol=1e-8)
+    q[1, 2] = -1.0
+    below = ball.rollout((q, v), dt=5e-3, steps=2, tolerance=1e-9, on_error="mark")
+    assert [(failure.row, failure.kind) for failure in below.failures] == [(1, "overlap")]
+
+
+def test_a_stop_holds_against_a_force():
+    """A joint that is driven against its stop does not pass it."""
+    arm = multibody.load(MODELS / "ur5.urdf", limits=True, gravity=(0, 0, 0), search=False)
+    assert arm.contact_names
+    low, high = arm.joint_ranges.T
+    elbow = arm.velocity_names.index("elbow_joint")
+    q0 = arm.neutral()
+    q0[elbow] = high[elbow] - 0.05
+    u = np.zeros((300, arm.nv))
+    u[:, elbow] = 20.0
+    motion = arm.rollout((q0, np.zeros(arm.nv)), u, dt=2e-3, tolerance=1e-8)
+    free = multibody.load(MODELS / "ur5.urdf", gravity=(0, 0, 0), search=False)
+    assert free.rollout((q0, np.zeros(arm.nv)), u, dt=2e-3).q[:, elbow].max() > high[elbow] + 0.1
+    assert motion.q[:, elbow].max() < high[elbow] + 1e-6
 
 
 def test_out(arm):
