@@ -107,7 +107,7 @@ impl Motion<'_> {
         let mut motion = motion.map_err(|error| failed(&error))?;
         let (nq, nv) = self.sizes;
         for step in 0..=self.settings.steps {
-            if step % self.settings.every == 0 {
+            if step.is_multiple_of(self.settings.every) {
                 let at = *written;
                 let (q, v) = (&mut q[at * nq..(at + 1) * nq], &mut v[at * nv..(at + 1) * nv]);
                 self.store(system.system_mut(), &mut state, q, v);

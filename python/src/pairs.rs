@@ -64,7 +64,7 @@ impl Motion<'_> {
         let mut method = method(&self.settings.method, lanes)?;
         let (h, mut written) = (Packed::constant(self.settings.dt), 0);
         for step in 0..=self.settings.steps {
-            if step % self.settings.every == 0 {
+            if step.is_multiple_of(self.settings.every) {
                 self.store_block(lanes, &mut block, &mut states, items, written);
                 written += 1;
             }

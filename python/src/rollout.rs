@@ -54,7 +54,7 @@ impl Settings {
         if !(self.dt > 0.0 && self.dt.is_finite()) {
             return refuse(format!("`dt` is {}: give a step in s, greater than zero", self.dt));
         }
-        if self.every == 0 || self.steps % self.every != 0 {
+        if !self.steps.is_multiple_of(self.every) || self.every == 0 {
             return refuse(format!("`every` is {}, which does not divide {} steps", self.every, self.steps));
         }
         if self.threads == Some(0) {
@@ -279,7 +279,7 @@ impl Motion<'_> {
         let u = self.u.map(|u| u.row(*k));
         let (nq, nv) = self.sizes;
         for step in 0..=self.settings.steps {
-            if step % self.settings.every == 0 {
+            if step.is_multiple_of(self.settings.every) {
                 let at = *written;
                 self.store(machine, &mut state, &mut q[at * nq..(at + 1) * nq], &mut v[at * nv..(at + 1) * nv]);
                 *written += 1;
