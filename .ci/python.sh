@@ -10,9 +10,8 @@ venv=target/python-venv
     $venv/bin/pip install --quiet 'maturin>=1.16,<2' 'numpy>=1.22' pytest 'gymnasium>=1.0'
 }
 cargo fmt --check --manifest-path python/Cargo.toml
-cargo build --release --locked --manifest-path python/Cargo.toml
 cargo clippy --release --locked --manifest-path python/Cargo.toml -- -D warnings
-$venv/bin/pip install --quiet --no-build-isolation --no-deps --force-reinstall ./python
-# Not in the folder of the sources, whose package has no native part.
-cd target
-python-venv/bin/pytest -q --import-mode=importlib ../python/tests "$@"
+# The package's build finds maturin on the path.
+export PATH=$PWD/$venv/bin:$PATH
+pip install --quiet --no-build-isolation --no-deps --force-reinstall ./python
+pytest -q python "$@"
