@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import operator
 from collections import namedtuple
 from collections.abc import Mapping
 from typing import Any, Callable, List, NamedTuple, Optional
@@ -164,15 +165,16 @@ def rollout(
         if np.ndim(u) not in (2, 3):
             raise ValueError(f"`u` has the shape {np.shape(u)}: (T, nv) or (B, T, nv) is expected")
         steps = np.shape(u)[-2]
-    if steps < 0:
-        raise ValueError(f"`steps` is {steps}")
+    for name, number, least in (("steps", steps, 0), ("every", every, 1), ("threads", 1 if threads is None else threads, 1)):
+        if not least <= operator.index(number) < 2**62:
+            raise ValueError(f"`{name}` is {number}: give a number from {least} on")
     inputs = {"params": params, "wrenches": wrenches, "gravity": gravity, "drive_q": drive_q}
     settings = {
-        "dt": dt,
+        "dt": float(dt),
         "steps": steps,
         "every": every,
         "method": method or ("rk4" if tolerance is None else "dop853"),
-        "tolerance": tolerance,
+        "tolerance": None if tolerance is None else float(tolerance),
         "momenta": state == "momenta",
         "layout": layout,
         "threads": threads,

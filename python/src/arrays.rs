@@ -4,6 +4,9 @@ use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn,
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
+/// Number of entries of arrays that there is always memory for.
+const FEW: usize = 1 << 16;
+
 /// An array of one or of many rows that a caller gave.
 pub struct Given<'py> {
     array: PyReadonlyArrayDyn<'py, f64>,
@@ -112,7 +115,13 @@ pub fn result<'py>(
     shape: &[usize],
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let Some(given) = given.filter(|given| !given.is_none()) else {
-        return Ok(PyArrayDyn::zeros(py, shape.to_vec(), false));
+        // NumPy itself says that it has no memory for so much.
+        let few = shape.iter().try_fold(1_usize, |all, n| all.checked_mul(*n)).is_some_and(|all| all < FEW);
+        if few {
+            return Ok(PyArrayDyn::zeros(py, shape.to_vec(), false));
+        }
+        let zeros = py.import("numpy")?.call_method1("zeros", (pyo3::types::PyTuple::new(py, shape)?,))?;
+        return Ok(zeros.cast_into::<PyArrayDyn<f64>>()?);
     };
     let array = given
         .cast::<PyArrayDyn<f64>>()

@@ -64,7 +64,43 @@ fn method(settings: &Settings, system: &System) -> (Method, Projection<System>, 
     (WithPostStep::new(system, method, hold()), hold(), step)
 }
 
+/// Index of the parameters among the fields.
+fn params() -> Option<usize> {
+    FIELDS.iter().position(|field| field.array.name == "params")
+}
+
 impl Motion<'_> {
+    fn has_params(&self) -> bool {
+        self.fields.iter().any(|(field, _)| Some(*field) == params())
+    }
+
+    /// The mechanism with the inputs of row `k`.
+    fn table(&self, touching: &Touching, k: usize) -> ModeTable<Compiled> {
+        let (own, others): (Vec<_>, Vec<_>) = self.fields.iter().partition(|(field, _)| Some(*field) == params());
+        let mut table = match own.first() {
+            None => touching.table.clone(),
+            Some((field, rows)) => {
+                let mut full = touching.full.clone();
+                set(&mut full, *field, rows.row(k));
+                ModeTable::new(full, touching.contacts.clone())
+            }
+        };
+        others.iter().for_each(|(field, rows)| set(&mut table, *field, rows.row(k)));
+        table.inputs().tau.fill(0.0);
+        table
+    }
+
+    /// Sets the joint forces of a step of row `k`.
+    fn drive(&self, k: usize, step: usize, q: &[f64], system: &mut System) {
+        let Some(u) = self.u else { return };
+        let u = &u.row(k)[step * self.sizes.1..(step + 1) * self.sizes.1];
+        let tau = &mut system.system_mut().inputs().tau;
+        match self.layout {
+            None => tau.copy_from_slice(u),
+            Some(layout) => layout.v_from(q, u, tau),
+        }
+    }
+
     /// Computes a row of a model with contacts, as [`Motion::row`](crate::rollout) does without.
     pub fn row_with_contacts(
         &self,
@@ -75,33 +111,11 @@ impl Motion<'_> {
         beat: &mut Beat,
     ) -> Result<(), Failed> {
         let mut state = self.begin(machine, *k)?;
-        let params = FIELDS.iter().position(|field| field.array.name == "params");
-        let given = self.fields.iter().find(|(field, _)| Some(*field) == params);
-        let mut table = match given {
-            None => touching.table.clone(),
-            Some((field, rows)) => {
-                let mut full = touching.full.clone();
-                set(&mut full, *field, rows.row(*k));
-                ModeTable::new(full, touching.contacts.clone())
-            }
-        };
-        let others = self.fields.iter().filter(|(field, _)| Some(*field) != params);
-        others.for_each(|(field, rows)| set(&mut table, *field, rows.row(*k)));
-        table.inputs().tau.fill(0.0);
-        let mut system = WithContacts::new(table);
+        let mut system = WithContacts::new(self.table(touching, *k));
         let (method, close, step) = method(self.settings, &system);
         let rules = RegimeRules::new(RegimeChoice::Automatic, self.settings.dt.min(LONGEST));
-        let driven = |step: usize, q: &[f64], system: &mut System| {
-            let Some(u) = self.u else { return };
-            let u = &u.row(*k)[step * self.sizes.1..(step + 1) * self.sizes.1];
-            let tau = &mut system.system_mut().inputs().tau;
-            match self.layout {
-                None => tau.copy_from_slice(u),
-                Some(layout) => layout.v_from(q, u, tau),
-            }
-        };
         if self.settings.steps > 0 {
-            driven(0, &state.q, &mut system);
+            self.drive(*k, 0, &state.q, &mut system);
         }
         let motion = ContactMotion::new(&mut system, (method, step), close, rules, 0.0, (&state.q, &state.p));
         let mut motion = motion.map_err(|error| failed(&error))?;
@@ -117,7 +131,7 @@ impl Motion<'_> {
                 break;
             }
             if step > 0 && self.u.is_some() {
-                driven(step, &state.q, &mut system);
+                self.drive(*k, step, &state.q, &mut system);
                 motion.resume(&mut system).map_err(|error| failed(&error))?;
             }
             let (end, mut left) = ((step + 1) as f64 * self.settings.dt, MOST_STEPS);
@@ -134,7 +148,7 @@ impl Motion<'_> {
             }
             motion.state(&system, &mut state.q, &mut state.p);
         }
-        if given.is_none() {
+        if !self.has_params() {
             touching.table = system.system().clone();
         }
         Ok(())

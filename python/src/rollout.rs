@@ -120,7 +120,7 @@ pub fn rollout<'py>(
     let u = u.map(|u| Given::read(&u, "u", &[settings.steps, nv])).transpose()?;
     let inputs = Inputs::read(inputs, &machines.sizes())?;
     let batch = inputs.batch([Some(&q0), Some(&v0), u.as_ref()].into_iter().flatten())?;
-    let count = settings.steps / settings.every + 1;
+    let count = (settings.steps / settings.every).saturating_add(1);
     let shape = |n: usize| -> Vec<usize> { batch.into_iter().chain([count, n]).collect() };
     let (q_out, v_out) = (out.as_ref().map(|out| &out.0), out.as_ref().map(|out| &out.1));
     let (q, v) = (result(py, q_out, "q", &shape(nq))?, result(py, v_out, "v", &shape(nv))?);

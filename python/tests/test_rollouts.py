@@ -200,7 +200,8 @@ def test_out(arm):
         (dict(dt=1e-3), "give `steps`"),
         (dict(dt=1e-3, steps=-1), "`steps` is -1"),
         (dict(dt=1e-3, steps=3, every=2), "does not divide 3"),
-        (dict(dt=1e-3, steps=3, every=0), "does not divide 3"),
+        (dict(dt=1e-3, steps=3, every=0), "`every` is 0"),
+        (dict(dt=1e-3, steps=3, threads=-1), "`threads` is -1"),
         (dict(dt=1e-3, steps=1, method="rk5"), "no method is called `rk5`"),
         (dict(dt=1e-3, steps=1, tolerance=2.0), "between 0 and 1"),
         (dict(dt=1e-3, steps=1, layout="drake"), "no layout is called `drake`"),
@@ -216,6 +217,12 @@ def test_out(arm):
 def test_wrong_settings(arm, settings, words):
     with pytest.raises(ValueError, match=words):
         arm.rollout((np.zeros((2, 6)), np.zeros((2, 6))), **settings)
+
+
+@pytest.mark.parametrize("steps", [10**15, 2**63 - 1, 2**64 - 1, 2**80])
+def test_more_steps_than_there_is_memory_for(arm, steps):
+    with pytest.raises((MemoryError, ValueError, OverflowError)):
+        arm.rollout((np.zeros(6), np.zeros(6)), dt=1e-3, steps=steps)
 
 
 def test_other_threads_of_python_run_meanwhile(arm):
