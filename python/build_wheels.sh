@@ -3,6 +3,7 @@
 # (`pip install maturin[zig]`), which is also the linker for the other architecture.
 set -euo pipefail
 cd "$(dirname "$0")"
+command -v maturin >/dev/null || { echo "no maturin: pip install 'maturin[zig]'" >&2; exit 1; }
 host=$(rustc -vV | sed -n 's/^host: //p')
 zig=()
 if python3 -c 'import ziglang' 2>/dev/null || command -v zig >/dev/null; then
@@ -23,7 +24,9 @@ for target in x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu; do
         missing=1
         continue
     fi
-    maturin build --profile wheel --locked --target "$target" --out dist "${zig[@]}"
+    other=()
+    [ "$target" = "$host" ] || other=(--target "$target")
+    maturin build --profile wheel --locked --out dist "${other[@]}" "${zig[@]}"
 done
 ls -l dist/*.whl
 exit $missing
