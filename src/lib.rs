@@ -56,8 +56,8 @@ pub use mbd_runtime as runtime;
 ///
 /// | argument | meaning | default |
 /// | --- | --- | --- |
-/// | `path = "models/arm.urdf"` | the description, a `.toml` or `.urdf` file; relative to the folder of `Cargo.toml` | |
-/// | `toml = r#"..."#`, `urdf = r#"..."#` | instead of `path`: the description itself | |
+/// | `path = "models/arm.urdf"` | the description, a `.toml`, `.urdf` or `.xml` (MJCF) file; relative to the folder of `Cargo.toml` | |
+/// | `toml = r#"..."#`, `urdf = r#"..."#`, `mjcf = r#"..."#` | instead of `path`: the description itself | |
 /// | `name = Arm` | the type; attributes and a narrower visibility may stand before it: `pub(crate) Arm` | `pub` |
 /// | `outputs = [rates, energy]` | what to compute, of the outputs below | `[rates, momenta, energy]`, and what only mechanisms with loops or couplings have where there are some |
 /// | `scalar = f32` | numbers: `f64` or `f32` | `f64` |

@@ -1,7 +1,5 @@
 //! The table of a simulation: which columns it has, and their numbers.
 
-use std::fmt::Write as _;
-
 use multibody::codegen::plan::Plan;
 use multibody::codegen::words::{did_you_mean, list, quote};
 use multibody::runtime::sweep::FrameState;
@@ -9,6 +7,7 @@ use multibody::runtime::Constrained;
 
 use super::control::Driven;
 use super::motion::{mechanism, Record, Settings};
+use super::tables::{self, Table};
 use super::{Failure, Outcome};
 
 /// A group of columns.
@@ -143,7 +142,7 @@ pub fn chosen(plan: &Plan, asked: &[String], controlled: bool) -> Outcome<Column
 }
 
 /// The table of a motion without contacts.
-pub fn table(plan: &Plan, settings: &Settings, record: &Record, columns: &Columns) -> Outcome<String> {
+pub fn table(plan: &Plan, settings: &Settings, record: &Record, columns: &Columns) -> Outcome<Table> {
     table_with(plan, settings, record, columns, &[])
 }
 
@@ -154,16 +153,13 @@ pub fn table_with(
     record: &Record,
     columns: &Columns,
     forces: &[Vec<[f64; 3]>],
-) -> Outcome<String> {
-    let mut text = String::from("t");
-    for (_, name) in columns.groups.iter().flat_map(|(_, names)| names) {
-        text += ",";
-        text += &quoted(name);
-    }
-    text += "\n";
+) -> Outcome<Table> {
+    let mut names = vec![String::from("t")];
+    names.extend(columns.groups.iter().flat_map(|(_, names)| names).map(|(_, name)| name.clone()));
+    let mut table = Table { names, numbers: Vec::new(), about: tables::about(plan, settings) };
     let mut state = State { driven: settings.driven(mechanism(plan, true)?), plan };
     for (row, t) in record.t.iter().enumerate() {
-        let _ = write!(text, "{t}");
+        table.numbers.push(*t);
         for (group, names) in &columns.groups {
             let numbers: Vec<f64> = match group {
                 Group::Coordinates => record.q[row].clone(),
@@ -179,13 +175,10 @@ pub fn table_with(
                 Group::Multipliers => state.multipliers(*t, &record.q[row], &record.v[row]),
                 Group::Reactions => state.reactions(*t, (&record.q[row], &record.v[row], &record.p[row])),
             };
-            for (at, _) in names {
-                let _ = write!(text, ",{}", numbers[*at]);
-            }
+            table.numbers.extend(names.iter().map(|(at, _)| numbers[*at]));
         }
-        text += "\n";
     }
-    Ok(text)
+    Ok(table)
 }
 
 /// What is computed of the state of a row.

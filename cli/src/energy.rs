@@ -241,6 +241,21 @@ fn number(x: f64) -> String {
     }
 }
 
+/// What a plot says of the energy where a curve would show nothing but round-off.
+pub fn in_words(record: &Record) -> Option<String> {
+    let (ends, balance) = (&record.ends, &record.balance);
+    let largest = ends.change.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    // Runs with contacts keep no balance; the energy is a sum that is rounded in any case.
+    let rounding = balance.rounding().max(EVALUATION * ends.scale);
+    (largest.is_finite() && largest <= rounding).then(|| match largest == 0.0 {
+        true => "The energy does not change in any digit.".to_string(),
+        false => {
+            let relative = ends.changes().iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            format!("The energy is constant to round-off: it changes by at most {relative:.1e} of the largest kinetic energy.")
+        }
+    })
+}
+
 /// Judges a run by its energy.
 pub fn judge(record: &Record, settings: &Settings) -> Verdict {
     let (balance, ends, steps) = (&record.balance, &record.ends, record.statistics.steps);

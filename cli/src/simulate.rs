@@ -22,7 +22,9 @@ use super::motion::{simulate, Drift, Record, Settings, Spent};
 use super::output::{note, writable, write_files};
 use super::plot::{self, Panel};
 use super::probe::Probe;
-use super::{columns, contacts, energy, interrupt, loops, picture, probe, source, trust, verdict, Failure, Outcome};
+use super::{
+    columns, contacts, energy, interrupt, loops, picture, probe, source, tables, trust, verdict, Failure, Outcome,
+};
 
 /// Default method and tolerance. For the double pendulum, the spherical pendulum, the UR5 and the Panda, the error at
 /// the end was 4 to 160 times below that of `dop853` at this tolerance, for at most a sixth more evaluations.
@@ -96,6 +98,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
             "give --csv and --svg two names",
         ));
     }
+    tables::known(&csv)?;
     writable(&csv)?;
     writable(&svg)?;
     let drawing = picture::drawing(&plan, args)?;
@@ -124,13 +127,11 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     }
     interrupt::listen();
     let record = simulate(&plan, (q, v), &settings)?;
-    let picture = plot::svg(&title(&plan, &settings), &panels(&plan, &record)).map_err(|e| {
-        Failure::new(format!("cannot draw the plot: {e}"), "look at the numbers in the table; --csv names it")
-    })?;
-    let table = columns::table(&plan, &settings, &record, &columns)?;
-    let mut files = vec![(csv.as_path(), table.as_str()), (svg.as_path(), picture.as_str())];
+    let picture = plot::svg(&title(&plan, &settings), &panels(&plan, &record));
+    let table = columns::table(&plan, &settings, &record, &columns)?.file(&csv)?;
+    let mut files = vec![(csv.as_path(), table.as_slice()), (svg.as_path(), picture.as_bytes())];
     let motion = args.picture.as_deref().map(|file| (file, picture::svg(&plan, &record, &[], &drawing)));
-    files.extend(motion.as_ref().map(|(file, text)| (*file, text.as_str())));
+    files.extend(motion.as_ref().map(|(file, text)| (*file, text.as_bytes())));
     write_files(&files)?;
     writeln!(out, "{}", title(&plan, &settings))?;
     about_control(args, &settings, &record, out)?;
@@ -236,16 +237,14 @@ fn with_contacts(
     interrupt::listen();
     let touched = contacts::simulate(plan, start, settings, args.picture.is_some() || columns.forces())?;
     let record = &touched.record;
-    let plot = plot::svg(&title(plan, settings), &panels(plan, record)).map_err(|e| {
-        Failure::new(format!("cannot draw the plot: {e}"), "look at the numbers in the table; --csv names it")
-    })?;
-    let table = columns::table_with(plan, settings, record, columns, &touched.forces)?;
+    let plot = plot::svg(&title(plan, settings), &panels(plan, record));
+    let table = columns::table_with(plan, settings, record, columns, &touched.forces)?.file(csv)?;
     let (events, beside) = (contacts::table(plan, &touched.events), contacts::beside(csv));
-    let mut files = vec![(csv, table.as_str()), (svg, plot.as_str()), (beside.as_path(), events.as_str())];
+    let mut files = vec![(csv, table.as_slice()), (svg, plot.as_bytes()), (beside.as_path(), events.as_bytes())];
     let motion = args.picture.as_deref().map(|file| (file, picture::svg(plan, record, &touched.forces, drawing)));
-    files.extend(motion.as_ref().map(|(file, text)| (*file, text.as_str())));
+    files.extend(motion.as_ref().map(|(file, text)| (*file, text.as_bytes())));
     let modes = args.record_modes.as_deref().map(|file| (file, modes::text(&plan.model, &touched.visits)));
-    files.extend(modes.as_ref().map(|(file, text)| (*file, text.as_str())));
+    files.extend(modes.as_ref().map(|(file, text)| (*file, text.as_bytes())));
     write_files(&files)?;
     writeln!(out, "{}", title(plan, settings))?;
     about_control(args, settings, record, out)?;
@@ -560,11 +559,7 @@ pub fn panels(plan: &Plan, record: &Record) -> Vec<Panel> {
             continue;
         }
         let line = |k: usize| (names[k].clone(), record.q.iter().map(|q| q[k]).collect());
-        panels.push(Panel {
-            label: label.to_string(),
-            t: record.t.clone(),
-            lines: chosen.into_iter().map(line).collect(),
-        });
+        panels.push(Panel::new(label, record.t.clone(), chosen.into_iter().map(line).collect()).apart());
     }
     if !record.efforts.is_empty() {
         let names = plan.velocity_names();
@@ -572,11 +567,15 @@ pub fn panels(plan: &Plan, record: &Record) -> Vec<Panel> {
         let line = |k: usize| (names[k].clone(), record.efforts.iter().map(|tau| tau[k]).collect());
         let lines: Vec<_> = (0..names.len()).filter(moved).map(line).collect();
         if !lines.is_empty() {
-            panels.push(Panel { label: "effort [N m, N]".to_string(), t: record.t.clone(), lines });
+            panels.push(Panel::new("effort [N m, N]", record.t.clone(), lines).apart());
         }
     }
-    let label = "relative energy change".to_string();
-    panels.push(Panel { label, t: record.ends.t.clone(), lines: vec![(String::new(), record.ends.changes())] });
+    let changes = vec![(String::new(), record.ends.changes())];
+    let energy = Panel::new("change of the energy / largest kinetic energy", record.ends.t.clone(), changes);
+    panels.push(match energy::in_words(record) {
+        Some(words) => energy.in_words(words),
+        None => energy,
+    });
     panels
 }
 

@@ -7,7 +7,7 @@ use multibody::codegen::diag::Diagnostics;
 use multibody::codegen::model::{Model, Wrench, WrenchAxes};
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
-use multibody::codegen::read::{load_variant, load_with, read_text, ImportOptions, Variant};
+use multibody::codegen::read::{load_variant, load_with, read_bytes, ImportOptions, Variant};
 use multibody::codegen::search::{self, Chosen};
 use multibody::codegen::words;
 use multibody::runtime::interp::MassMatrixError;
@@ -64,10 +64,10 @@ pub fn models(path: &Path, options: &ImportOptions) -> Outcome<(Model, Vec<Varia
     told(path, |file, text| load_with(file, text, options, &base))
 }
 
-/// The text of the base that a description names.
-pub fn base(path: &Path) -> std::io::Result<String> {
+/// A file that a description names.
+pub fn base(path: &Path) -> std::io::Result<Vec<u8>> {
     is_input(path);
-    read_text(path)
+    read_bytes(path)
 }
 
 /// What is read from a file, with the findings told.

@@ -69,7 +69,6 @@ pub fn run(out: &mut dyn Write) -> Outcome {
     out.flush()?;
     speed(&states, &mut generated, &mut interpreter, out)?;
     let picture = plot::svg(&title(&plan, &settings()), &panels(&plan, &record));
-    let picture = picture.map_err(|e| Failure::new(format!("cannot draw the plot: {e}"), "report this as a bug"))?;
     write_file(Path::new(PLOT), &picture)?;
     writeln!(out, "\n6. Joint angles and energy over time: {PLOT}, in the current directory")?;
     writeln!(out, "\nNext: `mbd --help`, `mbd check YOUR_ROBOT.urdf`, `mbd generate YOUR_ROBOT.urdf --outputs rates`")?;

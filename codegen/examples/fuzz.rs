@@ -1,7 +1,7 @@
 //! Fuzzes the readers: mutates the shipped and the broken models and reports every panic.
 //!
 //! ```sh
-//! cargo run --release -p mbd-codegen --example fuzz -- --seconds 600 [--format toml|urdf] [--seed 1] [--save DIR]
+//! cargo run --release -p mbd-codegen --example fuzz -- --seconds 600 [--format toml|urdf|xml] [--seed 1] [--save DIR]
 //! ```
 //!
 //! Inputs that panic, take longer than a second, or give neither model nor error are written to the folder of `--save`
@@ -31,7 +31,7 @@ struct Options {
 fn options() -> Result<Options, String> {
     let crate_folder = env!("CARGO_MANIFEST_DIR");
     let save = PathBuf::from(crate_folder).join("../target/fuzz");
-    let mut options = Options { seconds: 60, formats: vec!["toml", "urdf"], seed: 0, save };
+    let mut options = Options { seconds: 60, formats: vec!["toml", "urdf", "xml"], seed: 0, save };
     let mut arguments = std::env::args().skip(1);
     while let Some(key) = arguments.next() {
         let value = arguments.next().ok_or(format!("{key} needs a value"))?;
@@ -41,6 +41,7 @@ fn options() -> Result<Options, String> {
             "--save" => options.save = value.into(),
             "--format" if value == "toml" => options.formats = vec!["toml"],
             "--format" if value == "urdf" => options.formats = vec!["urdf"],
+            "--format" if value == "xml" => options.formats = vec!["xml"],
             _ => return Err(format!("unknown option {key} {value}")),
         }
     }

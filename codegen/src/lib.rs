@@ -11,6 +11,7 @@ mod error;
 pub mod generate;
 pub mod identifiable;
 mod import;
+mod inertia;
 #[cfg(feature = "jit")]
 pub mod jit;
 mod lower;
@@ -26,6 +27,7 @@ mod rounded_once;
 mod sample;
 pub mod search;
 pub mod symbolic;
+mod symmetric;
 mod trace;
 pub mod transfer;
 #[cfg(feature = "wasm")]

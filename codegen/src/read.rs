@@ -8,7 +8,7 @@ use crate::diag::Diagnostics;
 use crate::import::raw::RawModel;
 use crate::import::source::{Findings, Span};
 use crate::import::words::{did_you_mean, list, quote};
-use crate::import::{toml, urdf};
+use crate::import::{mjcf, toml, urdf, XmlFormat};
 use crate::model::Model;
 use crate::names::rust_name;
 
@@ -36,12 +36,12 @@ pub struct Variant {
     pub model: Model,
 }
 
-/// Reads and checks a description in the format its file name ends in: `.toml`, `.urdf`, or `.xml` with a `<robot>` in
-/// it.
+/// Reads and checks a description in the format its file name ends in: `.toml`, `.urdf`, `.mjcf`, or `.xml` with a
+/// `<robot>` (URDF) or a `<mujoco>` (MJCF) in it.
 ///
 /// `file` names the source in the findings and in the origins of the model, and gives the model its name if the text
-/// does not. Of other files, only the `[base]` that a TOML text names is read, from its path relative to the folder of
-/// `file`.
+/// does not. Of other files, only the `[base]` that a TOML text names, and the included files and meshes of an MJCF text are read, from
+/// their paths relative to the folder of `file`.
 ///
 /// # Errors
 /// All findings at once, in the order of the text, where one of them is an error.
@@ -147,27 +147,27 @@ pub fn load_variant(
 
 /// [`load`], with all variants.
 pub fn load_all(file: &str, text: &str, options: &ImportOptions) -> (Option<(Model, Vec<Variant>)>, Diagnostics) {
-    load_with(file, text, options, &read_text)
+    load_with(file, text, options, &read_bytes)
 }
 
 /// Largest size of a description, bytes. None is as long, but a device file may be endless.
 const LONGEST: u64 = 256 << 20;
 
-/// Reads the text of a file of at most 256 MiB.
+/// Reads a file of at most 256 MiB.
 ///
 /// # Errors
 /// Those of reading, and a longer file.
-pub fn read_text(path: &Path) -> std::io::Result<String> {
-    let mut text = String::new();
-    let length = std::fs::File::open(path)?.take(LONGEST + 1).read_to_string(&mut text)?;
+pub fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let length = std::fs::File::open(path)?.take(LONGEST + 1).read_to_end(&mut bytes)?;
     if length as u64 > LONGEST {
         return Err(std::io::Error::other(format!("it is longer than {} MiB", LONGEST >> 20)));
     }
-    Ok(text)
+    Ok(bytes)
 }
 
-/// [`load_all`], with the `[base]` of a TOML text read by `files`, to which its path is given as it is relative to
-/// `file`.
+/// [`load_all`], with the `[base]` of a TOML text and the files that an MJCF text names read by `files`, to which their
+/// paths are given as they are relative to `file`.
 pub fn load_with(
     file: &str,
     text: &str,
@@ -208,12 +208,16 @@ fn raw_model(
         findings.error(Span::FILE, message, help);
         None
     };
-    const KNOWN: &str = "models are read from `.toml` and `.urdf` files";
+    const KNOWN: &str = "models are read from `.toml`, `.urdf` and `.xml` files";
     match extension.as_deref() {
         Some("toml") => toml::read(text, options, findings, files),
         Some("urdf") => urdf::read(text, options, findings),
-        Some("xml") if text.contains("<robot") => urdf::read(text, options, findings),
-        Some("xml") => refuse("no `<robot>` in this file", "of XML formats only URDF can be read"),
+        Some("mjcf") => mjcf::read(text, options, findings, files),
+        Some("xml") => match XmlFormat::of(text) {
+            Some(XmlFormat::Urdf) => urdf::read(text, options, findings),
+            Some(XmlFormat::Mjcf) => mjcf::read(text, options, findings, files),
+            None => refuse("no `<robot>` or `<mujoco>` in this file", "of XML formats, URDF and MJCF are read"),
+        },
         Some("xacro") => refuse("xacro files have to be expanded first", "run `xacro model.xacro > model.urdf`"),
         Some(other) => refuse(&format!("cannot read files that end in {}", quote(other)), KNOWN),
         None => refuse("the file name does not tell the format", KNOWN),
@@ -280,7 +284,7 @@ mod tests {
         for (file, text, expect) in [
             ("m.sdf", TEXT, "m.sdf: error: cannot read files that end in `sdf`"),
             ("m", TEXT, "m: error: the file name does not tell the format"),
-            ("m.xml", TEXT, "m.xml: error: no `<robot>` in this file"),
+            ("m.xml", TEXT, "m.xml: error: no `<robot>` or `<mujoco>` in this file"),
             ("m.xacro", TEXT, "m.xacro: error: xacro files have to be expanded first"),
         ] {
             let findings = model(file, text, &options).expect_err("a refusal");

@@ -1,17 +1,18 @@
 //! Optimal control with bounded inputs: the iterative linear-quadratic regulator with box constraints (Y. Tassa,
 //! N. Mansard, E. Todorov, *Control-limited differential dynamic programming*, ICRA 2014).
 //!
-//! The cost is `Σ ½ (x − g)ᵀ Q (x − g) + ½ uᵀ R u` over all nodes but the last, and `½ (x − g)ᵀ Q_N (x − g)` at the last,
-//! with diagonal weights. Nothing is allocated, and no function beyond the four operations is called, so that the bits are
+//! The cost is `Σ ½ (y − g)ᵀ Q (y − g) + ½ uᵀ R u` over all nodes but the last, and `½ (y − g)ᵀ Q_N (y − g)` at the last,
+//! with diagonal weights; `y` is the state, or what [`Dynamics`] computes of it. Nothing is allocated, and no function beyond the four operations is called, so that the bits are
 //! the same on every machine.
 
+use super::box_minimum::{box_minimum, clamp};
 use super::steps::Dynamics;
 use super::{Real, Scalar};
 
 /// Weights, goal and bounds.
 #[derive(Clone, Debug)]
 pub struct Problem<S, const NX: usize, const NU: usize> {
-    /// The state to be reached.
+    /// The values of `y` to be reached.
     pub goal: [S; NX],
     /// Diagonal of `Q`.
     pub running: [S; NX],
@@ -24,10 +25,10 @@ pub struct Problem<S, const NX: usize, const NU: usize> {
 }
 
 impl<S: Real, const NX: usize, const NU: usize> Problem<S, NX, NU> {
-    fn state_cost(&self, weights: &[S; NX], x: &[S; NX]) -> S {
+    fn state_cost(&self, weights: &[S; NX], y: &[S; NX]) -> S {
         let half = S::constant(0.5);
         (0..NX).fold(S::zero(), |sum, i| {
-            let e = x[i] - self.goal[i];
+            let e = y[i] - self.goal[i];
             sum + half * weights[i] * e * e
         })
     }
@@ -39,16 +40,6 @@ impl<S: Real, const NX: usize, const NU: usize> Problem<S, NX, NU> {
 
     fn clamp(&self, i: usize, u: S) -> S {
         clamp(u, self.bounds[0][i], self.bounds[1][i])
-    }
-}
-
-fn clamp<S: Real>(x: S, low: S, high: S) -> S {
-    if x < low {
-        low
-    } else if x > high {
-        high
-    } else {
-        x
     }
 }
 
@@ -77,6 +68,8 @@ pub struct Ilqr<S, const NX: usize, const NU: usize, const N: usize> {
     change: [[S; NU]; N],
     trial: ([[S; NX]; N], [[S; NU]; N]),
     regular: S,
+    /// Trajectories that the last iteration tried.
+    pub tried: u32,
 }
 
 impl<S: Real, const NX: usize, const NU: usize, const N: usize> Ilqr<S, NX, NU, N> {
@@ -90,7 +83,7 @@ impl<S: Real, const NX: usize, const NU: usize, const N: usize> Ilqr<S, NX, NU, 
         let zero = S::zero();
         let u = [core::array::from_fn(|i| problem.clamp(i, u[i])); N];
         let (gains, change) = ([[[zero; NX]; NU]; N], [[zero; NU]; N]);
-        let mut all = Ilqr { x: [*x; N], u, cost: zero, gains, change, trial: ([*x; N], u), regular: zero };
+        let mut all = Ilqr { x: [*x; N], u, cost: zero, gains, change, trial: ([*x; N], u), regular: zero, tried: 0 };
         all.cost = all.roll_out(dynamics, problem, x, zero);
         all.take();
         all
@@ -126,16 +119,25 @@ impl<S: Real, const NX: usize, const NU: usize, const N: usize> Ilqr<S, NX, NU, 
                 }
                 us[k][i] = problem.clamp(i, u);
             }
-            cost = cost + problem.state_cost(&problem.running, &x) + problem.effort_cost(&us[k]);
-            x = dynamics.step(&x, &us[k]);
+            let (next, y) = dynamics.step_weighed(&x, &us[k]);
+            cost = cost + problem.state_cost(&problem.running, &y) + problem.effort_cost(&us[k]);
+            x = next;
         }
         xs[N - 1] = x;
-        cost + problem.state_cost(&problem.end, &x)
+        cost + problem.state_cost(&problem.end, &dynamics.weighed(&x))
+    }
+
+    /// The cost after a step of length `alpha` along the policy, which is not taken.
+    pub fn try_step(&mut self, dynamics: &mut impl Dynamics<S, NX, NU>, problem: &Problem<S, NX, NU>, alpha: S) -> S {
+        let start = self.x[0];
+        self.tried += 1;
+        self.roll_out(dynamics, problem, &start, alpha)
     }
 
     /// One iteration: the policy from the end to the start, then a step along it that reduces the cost.
     pub fn iterate(&mut self, dynamics: &mut impl Dynamics<S, NX, NU>, problem: &Problem<S, NX, NU>) -> Progress<S> {
-        let Some([linear, quadratic]) = self.backward(dynamics, problem) else {
+        self.tried = 0;
+        let Some([linear, quadratic]) = self.direction(dynamics, problem) else {
             self.cautious();
             return Progress::Rejected;
         };
@@ -144,10 +146,10 @@ impl<S: Real, const NX: usize, const NU: usize, const N: usize> Ilqr<S, NX, NU, 
         if !falls {
             return Progress::Converged;
         }
-        let (start, half) = (self.x[0], S::constant(0.5));
+        let half = S::constant(0.5);
         let mut alpha = S::one();
         for _ in 0..12 {
-            let cost = self.roll_out(dynamics, problem, &start, alpha);
+            let cost = self.try_step(dynamics, problem, alpha);
             let expected = -(alpha * linear + alpha * alpha * quadratic);
             let reduced = self.cost - cost;
             if cost.is_finite() && reduced > S::constant(1e-4) * expected {
@@ -170,64 +172,96 @@ impl<S: Real, const NX: usize, const NU: usize, const N: usize> Ilqr<S, NX, NU, 
 
     /// The policy; returns what it changes the cost by in the first and second order, or `None` where the input's Hessian is
     /// not positive definite.
-    fn backward(&mut self, dynamics: &mut impl Dynamics<S, NX, NU>, problem: &Problem<S, NX, NU>) -> Option<[S; 2]> {
+    pub fn direction(
+        &mut self,
+        dynamics: &mut impl Dynamics<S, NX, NU>,
+        problem: &Problem<S, NX, NU>,
+    ) -> Option<[S; 2]> {
         let zero = S::zero();
-        let mut vx: [S; NX] = core::array::from_fn(|i| problem.end[i] * (self.x[N - 1][i] - problem.goal[i]));
-        let mut vxx = [[zero; NX]; NX];
-        (0..NX).for_each(|i| vxx[i][i] = problem.end[i]);
+        let mut value = Value { x: [zero; NX], xx: [[zero; NX]; NX] };
+        let y = dynamics.weighed_again(&self.x[N - 1], true);
+        let d = core::array::from_fn(|i| problem.end[i] * (y[i] - problem.goal[i]));
+        dynamics.add_weighed(&d, &problem.end, &mut value.x, &mut value.xx);
         let (mut a, mut b) = ([[zero; NX]; NX], [[zero; NU]; NX]);
         let mut expected = [zero; 2];
         for k in (0..N - 1).rev() {
             let (x, u) = (&self.x[k], &self.u[k]);
             dynamics.linearise(x, u, &mut a, &mut b);
-            // V A and V B.
-            let (va, vb) = (product(&vxx, &a), product(&vxx, &b));
-            let mut qxx = transposed_product(&a, &va);
-            let mut quu = transposed_product(&b, &vb);
-            let qux = transposed_product(&b, &va);
-            let (mut qx, mut qu) = (transposed_times(&a, &vx), transposed_times(&b, &vx));
-            for i in 0..NX {
-                qxx[i][i] = qxx[i][i] + problem.running[i];
-                qx[i] = qx[i] + problem.running[i] * (x[i] - problem.goal[i]);
-            }
-            let mut regular = quu;
+            let mut q = Expansion::of(&value, &a, &b);
+            let y = dynamics.weighed_again(x, false);
+            let d = core::array::from_fn(|i| problem.running[i] * (y[i] - problem.goal[i]));
+            dynamics.add_weighed(&d, &problem.running, &mut q.x, &mut q.xx);
+            let mut regular = q.uu;
             for i in 0..NU {
-                quu[i][i] = quu[i][i] + problem.effort[i];
-                qu[i] = qu[i] + problem.effort[i] * u[i];
-                regular[i][i] = quu[i][i] + self.regular;
+                q.uu[i][i] = q.uu[i][i] + problem.effort[i];
+                q.u[i] = q.u[i] + problem.effort[i] * u[i];
+                regular[i][i] = q.uu[i][i] + self.regular;
             }
             let room = [0, 1].map(|side| core::array::from_fn(|i| problem.bounds[side][i] - u[i]));
-            let solution = box_minimum(&regular, &qu, &room)?;
-            let step = solution.x;
-            let gain = solution.gains(&qux);
+            let solution = box_minimum(&regular, &q.u, &room)?;
+            let (step, gain) = (solution.x, solution.gains(&q.ux));
             for i in 0..NU {
-                let curved = (0..NU).fold(zero, |sum, j| sum + quu[i][j] * step[j]);
-                expected[0] = expected[0] + step[i] * qu[i];
+                let curved = (0..NU).fold(zero, |sum, j| sum + q.uu[i][j] * step[j]);
+                expected[0] = expected[0] + step[i] * q.u[i];
                 expected[1] = expected[1] + S::constant(0.5) * step[i] * curved;
             }
-            // V_x = Q_x + Kᵀ (Q_uu k + Q_u) + Q_xuᵀ k, V_xx = Q_xx + Kᵀ (Q_uu K + Q_ux) + Q_uxᵀ K.
-            let inner: [S; NU] = core::array::from_fn(|i| (0..NU).fold(qu[i], |sum, j| sum + quu[i][j] * step[j]));
-            let mut curved = product(&quu, &gain);
-            for (row, qux) in curved.iter_mut().zip(&qux) {
-                row.iter_mut().zip(qux).for_each(|(x, q)| *x = *x + *q);
-            }
-            let (left, right) = (transposed_product(&gain, &curved), transposed_product(&qux, &gain));
-            let (first, second) = (transposed_times(&gain, &inner), transposed_times(&qux, &step));
-            for i in 0..NX {
-                vx[i] = qx[i] + first[i] + second[i];
-                for j in 0..NX {
-                    vxx[i][j] = qxx[i][j] + left[i][j] + right[i][j];
-                }
-            }
-            for i in 0..NX {
-                for j in 0..i {
-                    let mean = S::constant(0.5) * (vxx[i][j] + vxx[j][i]);
-                    (vxx[i][j], vxx[j][i]) = (mean, mean);
-                }
-            }
+            q.under(&step, &gain, &mut value);
             (self.change[k], self.gains[k]) = (step, gain);
         }
         Some(expected)
+    }
+}
+
+/// Cost to go from a node, to second order: gradient and Hessian in the state.
+struct Value<S, const NX: usize> {
+    x: [S; NX],
+    xx: [[S; NX]; NX],
+}
+
+/// The same before the input is chosen.
+struct Expansion<S, const NX: usize, const NU: usize> {
+    x: [S; NX],
+    u: [S; NU],
+    xx: [[S; NX]; NX],
+    ux: [[S; NX]; NU],
+    uu: [[S; NU]; NU],
+}
+
+impl<S: Real, const NX: usize, const NU: usize> Expansion<S, NX, NU> {
+    /// The value at the next node as a function of state and input: `Aᵀ V A`, `Bᵀ V A`, `Bᵀ V B`.
+    fn of(value: &Value<S, NX>, a: &[[S; NX]; NX], b: &[[S; NU]; NX]) -> Self {
+        let (va, vb) = (product(&value.xx, a), product(&value.xx, b));
+        Expansion {
+            x: transposed_times(a, &value.x),
+            u: transposed_times(b, &value.x),
+            xx: transposed_product(a, &va),
+            ux: transposed_product(b, &va),
+            uu: transposed_product(b, &vb),
+        }
+    }
+
+    /// The value under the policy `δu = k + K δx`:
+    /// `V_x = Q_x + Kᵀ (Q_uu k + Q_u) + Q_xuᵀ k`, `V_xx = Q_xx + Kᵀ (Q_uu K + Q_ux) + Q_uxᵀ K`.
+    fn under(&self, step: &[S; NU], gain: &[[S; NX]; NU], value: &mut Value<S, NX>) {
+        let inner: [S; NU] = core::array::from_fn(|i| (0..NU).fold(self.u[i], |sum, j| sum + self.uu[i][j] * step[j]));
+        let mut curved = product(&self.uu, gain);
+        for (row, ux) in curved.iter_mut().zip(&self.ux) {
+            row.iter_mut().zip(ux).for_each(|(x, q)| *x = *x + *q);
+        }
+        let (left, right) = (transposed_product(gain, &curved), transposed_product(&self.ux, gain));
+        let (first, second) = (transposed_times(gain, &inner), transposed_times(&self.ux, step));
+        for i in 0..NX {
+            value.x[i] = self.x[i] + first[i] + second[i];
+            for j in 0..NX {
+                value.xx[i][j] = self.xx[i][j] + left[i][j] + right[i][j];
+            }
+        }
+        for i in 0..NX {
+            for j in 0..i {
+                let mean = S::constant(0.5) * (value.xx[i][j] + value.xx[j][i]);
+                (value.xx[i][j], value.xx[j][i]) = (mean, mean);
+            }
+        }
     }
 }
 
@@ -263,109 +297,4 @@ fn transposed_times<S: Scalar, const M: usize, const K: usize>(a: &[[S; M]; K], 
         out.iter_mut().zip(a).for_each(|(o, a)| *o = *o + *a * *x);
     }
     out
-}
-
-/// The minimum of a quadratic function in a box.
-pub struct BoxMinimum<S, const N: usize> {
-    /// The minimum.
-    pub x: [S; N],
-    /// Which components are between their bounds.
-    pub free: [bool; N],
-    /// `L` and `D` of the free part of the matrix, the unit matrix elsewhere.
-    factor: [[S; N]; N],
-}
-
-/// The minimum of `½ xᵀ H x + gᵀ x` between two bounds, by projected Newton steps; `None` where the free part of `H` is not
-/// positive definite. The bounds enclose zero.
-pub fn box_minimum<S: Real, const N: usize>(
-    h: &[[S; N]; N],
-    g: &[S; N],
-    bounds: &[[S; N]; 2],
-) -> Option<BoxMinimum<S, N>> {
-    let zero = S::zero();
-    let value = |x: &[S; N]| {
-        (0..N).fold(zero, |sum, i| {
-            let hx = (0..N).fold(zero, |sum, j| sum + h[i][j] * x[j]);
-            sum + x[i] * (g[i] + S::constant(0.5) * hx)
-        })
-    };
-    let (mut x, mut free, mut factor) = ([zero; N], [true; N], *h);
-    for round in 0..4 * N + 4 {
-        let gradient: [S; N] = core::array::from_fn(|i| (0..N).fold(g[i], |sum, j| sum + h[i][j] * x[j]));
-        let now: [bool; N] = core::array::from_fn(|i| {
-            !(x[i] <= bounds[0][i] && gradient[i] > zero || x[i] >= bounds[1][i] && gradient[i] < zero)
-        });
-        let settled = round > 0 && now == free;
-        free = now;
-        factor = factored(h, &free)?;
-        let step = solved(&factor, &core::array::from_fn(|i| if free[i] { -gradient[i] } else { zero }));
-        let (before, mut length) = (value(&x), S::one());
-        let mut next = x;
-        for _ in 0..20 {
-            next = core::array::from_fn(|i| clamp(x[i] + length * step[i], bounds[0][i], bounds[1][i]));
-            if value(&next) <= before {
-                break;
-            }
-            length = length * S::constant(0.5);
-        }
-        let still = next == x;
-        x = next;
-        // A full Newton step within the box, over the components that stay free, is the minimum.
-        if still || settled && (0..N).all(|i| !free[i] || x[i] > bounds[0][i] && x[i] < bounds[1][i]) {
-            break;
-        }
-    }
-    Some(BoxMinimum { x, free, factor })
-}
-
-impl<S: Real, const N: usize> BoxMinimum<S, N> {
-    /// `−H⁻¹ Q` over the free components, zero for the others.
-    fn gains<const M: usize>(&self, q: &[[S; M]; N]) -> [[S; M]; N] {
-        let mut out = [[S::zero(); M]; N];
-        for j in 0..M {
-            let right = core::array::from_fn(|i| if self.free[i] { -q[i][j] } else { S::zero() });
-            let column = solved(&self.factor, &right);
-            (0..N).for_each(|i| out[i][j] = column[i]);
-        }
-        out
-    }
-}
-
-/// `L D Lᵀ` of the free part of a symmetric matrix: `L` below the diagonal, `D` on it.
-fn factored<S: Real, const N: usize>(h: &[[S; N]; N], free: &[bool; N]) -> Option<[[S; N]; N]> {
-    let mut f = [[S::zero(); N]; N];
-    for i in 0..N {
-        for j in 0..=i {
-            let mut x = match free[i] && free[j] {
-                true => h[i][j],
-                false if i == j => S::one(),
-                false => S::zero(),
-            };
-            for k in 0..j {
-                x = x - f[i][k] * f[j][k] * f[k][k];
-            }
-            f[i][j] = if i == j { x } else { x / f[j][j] };
-        }
-        let positive = f[i][i] > S::zero();
-        if !positive {
-            return None;
-        }
-    }
-    Some(f)
-}
-
-fn solved<S: Real, const N: usize>(f: &[[S; N]; N], right: &[S; N]) -> [S; N] {
-    let mut x = *right;
-    for i in 0..N {
-        for j in 0..i {
-            x[i] = x[i] - f[i][j] * x[j];
-        }
-    }
-    for i in (0..N).rev() {
-        x[i] = x[i] / f[i][i];
-        for j in i + 1..N {
-            x[i] = x[i] - f[j][i] * x[j];
-        }
-    }
-    x
 }

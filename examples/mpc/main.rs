@@ -4,17 +4,20 @@
 //! `cargo run --release --example mpc`
 
 mod acrobot;
+mod box_minimum;
 mod ilqr;
 mod steps;
 #[cfg(test)]
 mod tests;
+mod velocities;
 
 use std::time::Instant;
 
 use acrobot::{JOINTS, LENGTH, NODES, PUSH};
 use ilqr::{Ilqr, Problem, Progress};
-use multibody::runtime::{Differentiable, Real, Scalar, StateDerivatives};
+use multibody::runtime::{Differentiable, Real, Scalar};
 use steps::{Dynamics, Steps};
+use velocities::Velocities;
 
 multibody::mbd_model! {
     path = "models/double_pendulum.toml",
@@ -67,7 +70,7 @@ const EVERY: u32 = if cfg!(debug_assertions) { 20 } else { 1 };
 /// Reaches for a position within a second, planned anew from where the arm then is.
 fn reach() -> f64 {
     const NODES: usize = 101;
-    let mut dynamics = ur5(0.01);
+    let mut dynamics = Velocities::new(ur5(0.01));
     let goal = [1.0, -0.9, 1.2, -0.4, 0.6, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     let mut x = [0.0, -1.5, 0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
     let limits = [150.0, 150.0, 150.0, 28.0, 28.0, 28.0];
@@ -79,7 +82,7 @@ fn reach() -> f64 {
         bounds: [limits.map(|x: f64| -x), limits],
     };
     let mut hold = [0.0; 6];
-    dynamics.system.bias(&core::array::from_fn(|i| x[i]), &[0.0; 6], &mut hold);
+    dynamics.steps.system.bias(&core::array::from_fn(|i| x[i]), &[0.0; 6], &mut hold);
     let mut plan = Box::new(Ilqr::<f64, 12, 6, NODES>::new(&mut dynamics, &problem, &x, &hold));
     while matches!(plan.iterate(&mut dynamics, &problem), Progress::Improved(part) if part > 1e-6) {}
     // The plan is behind the arm by up to a node; its policy makes up for it.

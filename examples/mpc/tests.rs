@@ -2,8 +2,10 @@
 
 use nalgebra::{Matrix1, Matrix2, RowVector2, SMatrix, Vector2};
 
-use super::ilqr::{box_minimum, Ilqr, Problem, Progress};
+use super::box_minimum::box_minimum;
+use super::ilqr::{Ilqr, Problem, Progress};
 use super::steps::Dynamics;
+use super::velocities::Velocities;
 use super::{swing_up, ur5};
 
 /// A mass on a track in steps of 0.1 s: a linear system.
@@ -139,4 +141,50 @@ fn the_acrobot_uses_all_its_effort() {
     let (plan, problem) = swing_up();
     let most = problem.bounds[1][0];
     assert!(plan.u[..200].iter().filter(|u| u[0].abs() == most).count() > 5);
+}
+
+/// `J = ∂(q, v)/∂(q, p)` of a node, against central differences.
+#[test]
+fn weighed_velocities_have_exact_derivatives() {
+    let mut random = fastrand::Rng::with_seed(7);
+    let mut dynamics = Velocities::<_, f64, 12, 6>::new(ur5(0.01));
+    let (mut a, mut b) = ([[0.0; 12]; 12], [[0.0; 6]; 12]);
+    for _ in 0..10 {
+        let x: [f64; 12] = core::array::from_fn(|_| 2.0 * random.f64() - 1.0);
+        let weights: [f64; 12] = core::array::from_fn(|_| random.f64());
+        dynamics.linearise(&x, &[0.0; 6], &mut a, &mut b);
+        let y = dynamics.weighed_again(&x, false);
+        assert_eq!(y, dynamics.weighed_again(&x, true));
+        // Another function computes these, with other roundings.
+        let again = dynamics.step_weighed(&x, &[0.0; 6]).1;
+        let largest = y.iter().fold(1.0_f64, |m, y| m.max(y.abs()));
+        assert!(y.iter().zip(&again).all(|(y, z)| (y - z).abs() < 1e-12 * largest), "{y:?} {again:?}");
+        let h = 1e-5;
+        let j = SMatrix::<f64, 12, 12>::from_columns(&core::array::from_fn::<_, 12, _>(|k| {
+            let [above, below] = [h, -h].map(|h| {
+                let mut x = x;
+                x[k] += h;
+                SMatrix::<f64, 12, 1>::from(dynamics.weighed(&x))
+            });
+            (above - below) / (2.0 * h)
+        }));
+        let mut gradient = [0.0; 12];
+        let mut hessian = [[0.0; 12]; 12];
+        dynamics.weighed_again(&x, true);
+        dynamics.add_weighed(&weights, &weights, &mut gradient, &mut hessian);
+        let w = SMatrix::<f64, 12, 1>::from(weights);
+        let (first, second) = (j.transpose() * w, j.transpose() * SMatrix::from_diagonal(&w) * j);
+        let largest = second.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+        for i in 0..12 {
+            assert!((gradient[i] - first[i]).abs() < 1e-7 * largest, "{i}: {} {}", gradient[i], first[i]);
+            for k in 0..12 {
+                assert!(
+                    (hessian[i][k] - second[(i, k)]).abs() < 1e-7 * largest,
+                    "{i} {k}: {} {}",
+                    hessian[i][k],
+                    second[(i, k)]
+                );
+            }
+        }
+    }
 }

@@ -18,6 +18,8 @@ pub enum Source {
     Toml(String),
     /// In the source: URDF.
     Urdf(String),
+    /// In the source: MJCF.
+    Mjcf(String),
 }
 
 /// Name of the type, with attributes and visibility.
@@ -80,7 +82,7 @@ pub enum Modes {
     Listed(String),
 }
 
-const KEYS: [&str; 18] = [
+const KEYS: [&str; 19] = [
     "path",
     "name",
     "variant",
@@ -98,6 +100,7 @@ const KEYS: [&str; 18] = [
     "modes",
     "toml",
     "urdf",
+    "mjcf",
     "runtime",
 ];
 
@@ -155,7 +158,7 @@ pub fn parse(input: TokenStream, errors: &mut Vec<Message>) -> Args {
     let given = |keys: &[&str]| keys.iter().any(|k| seen.iter().any(|s| s == k));
     // A missing argument may be a misspelt one, for which there is a message already.
     let unnamed = errors.len() > clean;
-    if !unnamed && !given(&["path", "toml", "urdf"]) {
+    if !unnamed && !given(&["path", "toml", "urdf", "mjcf"]) {
         let help = format!("add `path = \"...\"`, {EXAMPLE}, or `toml = \"...\"` with the description itself");
         errors.push(Message::new(Span::call_site(), "no model is given", help));
     }
@@ -180,6 +183,7 @@ impl Args {
             "path" => self.set_source(key, Source::File(text(&word, value)?), value)?,
             "toml" => self.set_source(key, Source::Toml(text(&word, value)?), value)?,
             "urdf" => self.set_source(key, Source::Urdf(text(&word, value)?), value)?,
+            "mjcf" => self.set_source(key, Source::Mjcf(text(&word, value)?), value)?,
             "name" => self.name = Some(name(value)?),
             "variant" => self.variant = Some((text(&word, value)?, place(value))),
             "outputs" => self.options.outputs = outputs(value)?,
@@ -223,7 +227,7 @@ impl Args {
     fn set_source(&mut self, key: &Ident, source: Source, value: &[TokenTree]) -> Result<(), Message> {
         if self.source.is_some() {
             let message = format!("a second model: `{key}`");
-            return Err(Message::new(key.span(), message, "give one of `path`, `toml` and `urdf`"));
+            return Err(Message::new(key.span(), message, "give one of `path`, `toml`, `urdf` and `mjcf`"));
         }
         self.source = Some((source, place(value)));
         Ok(())

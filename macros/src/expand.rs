@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use mbd_codegen::diag::{Diagnostic, Severity};
 use mbd_codegen::model::Model;
 use mbd_codegen::modes::{parse, ModeChoice};
-use mbd_codegen::read::{chosen, load_with, read_text, Base, ImportOptions, Variant};
+use mbd_codegen::read::{chosen, load_with, read_bytes, Base, ImportOptions, Variant};
 use mbd_codegen::words::{closest, did_you_mean, list, quote};
 use mbd_codegen::{generate, transfer_code, Output};
 use proc_macro2::{Group as Tokens, Ident, Literal, Span, TokenStream, TokenTree};
@@ -27,8 +27,8 @@ pub fn expand(input: TokenStream) -> TokenStream {
     let mut watched = TokenStream::new();
     let (mut model, mut all) = (None, None);
     if let Some(text) = &text {
-        let Loaded { read, findings, base } = text.load(&args);
-        watched.extend(base.as_deref().map(tracked));
+        let Loaded { read, findings, files } = text.load(&args);
+        watched.extend(files.iter().map(|file| tracked(file)));
         all = read.clone();
         model = read.and_then(|(model, variants)| {
             let (name, place) = args.variant.as_ref().map_or((None, text.place), |(name, place)| (Some(name), *place));
@@ -108,6 +108,7 @@ fn read(source: &Source, place: Place, errors: &mut Vec<Message>) -> Option<Text
         Source::File(path) => path,
         Source::Toml(text) => return Some(Text { label: "inline.toml".into(), text: text.clone(), file: None, place }),
         Source::Urdf(text) => return Some(Text { label: "inline.urdf".into(), text: text.clone(), file: None, place }),
+        Source::Mjcf(text) => return Some(Text { label: "inline.mjcf".into(), text: text.clone(), file: None, place }),
     };
     let root = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from).unwrap_or_default();
     let file = root.join(path);
@@ -119,7 +120,7 @@ fn read(source: &Source, place: Place, errors: &mut Vec<Message>) -> Option<Text
                     (format!("there is no file {}", quote(path)), similar_file(&file, path))
                 }
                 std::io::ErrorKind::InvalidData => {
-                    (format!("{} is not UTF-8 text", quote(path)), "models are TOML or URDF text".to_string())
+                    (format!("{} is not UTF-8 text", quote(path)), "models are TOML, URDF or MJCF text".to_string())
                 }
                 _ => (format!("cannot read {}: {error}", quote(path)), "a path names the file of a model".to_string()),
             };
@@ -148,8 +149,8 @@ struct Loaded {
     /// The model and its variants, if there is no error.
     read: Option<(Model, Vec<Variant>)>,
     findings: Vec<Diagnostic>,
-    /// The file that the description names as its base.
-    base: Option<PathBuf>,
+    /// The files that the description names, as its base or to include them.
+    files: Vec<PathBuf>,
 }
 
 impl Text {
@@ -170,20 +171,20 @@ impl Text {
 
     /// Reads the description.
     fn load(&self, args: &Args) -> Loaded {
-        let read_base = RefCell::new(None);
+        let named = RefCell::new(Vec::new());
         let files = |path: &Path| {
             let root = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from).unwrap_or_default();
             let file = root.join(path);
-            let text = read_text(&file)?;
-            *read_base.borrow_mut() = Some(file);
-            Ok(text)
+            let bytes = read_bytes(&file)?;
+            named.borrow_mut().push(file);
+            Ok(bytes)
         };
         let base = args.base.map_or(Base::default(), |(base, _)| base);
         // This is reported at the argument itself.
         let base = if self.is_toml() { Base::default() } else { base };
         let options = ImportOptions { base, gravity: args.gravity, ..ImportOptions::default() };
         let (read, findings) = load_with(&self.label, &self.text, &options, &files);
-        Loaded { read, findings: findings.0, base: read_base.take() }
+        Loaded { read, findings: findings.0, files: named.take() }
     }
 
     /// Makes the compiler read the file again when it changes.

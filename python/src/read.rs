@@ -22,7 +22,9 @@ pub struct Source {
 pub fn source(path: Option<PathBuf>, text: Option<String>, format: &str) -> PyResult<Source> {
     match (path, text) {
         (Some(path), None) => {
-            let text = read::read_text(&path).map_err(|error| unreadable(&path, &error))?;
+            let bytes = read::read_bytes(&path).map_err(|error| unreadable(&path, &error))?;
+            let wrong = |_| std::io::Error::new(std::io::ErrorKind::InvalidData, "it is not UTF-8 text");
+            let text = String::from_utf8(bytes).map_err(wrong).map_err(|error| unreadable(&path, &error))?;
             Ok(Source { file: path.display().to_string(), text })
         }
         (None, Some(text)) => Ok(Source { file: format!("text.{format}"), text }),
@@ -53,7 +55,7 @@ pub fn model(
     variant: Option<&str>,
     wrenches: &[String],
 ) -> PyResult<(Model, Diagnostics)> {
-    let read = || read::load_variant(&source.file, &source.text, options, &read::read_text, variant);
+    let read = || read::load_variant(&source.file, &source.text, options, &read::read_bytes, variant);
     let (model, found) = py.detach(read);
     let Some(mut model) = model else { return Err(model_error(py, &found)) };
     for name in wrenches {
@@ -72,12 +74,12 @@ pub fn model(
 
 /// All findings about a description.
 pub fn check<'py>(py: Python<'py>, source: &Source, options: &ImportOptions) -> PyResult<Bound<'py, PyList>> {
-    let (_, found) = py.detach(|| read::load_with(&source.file, &source.text, options, &read::read_text));
+    let (_, found) = py.detach(|| read::load_with(&source.file, &source.text, options, &read::read_bytes));
     findings(py, &found.0)
 }
 
 /// A description as one of the TOML format.
 pub fn convert(py: Python<'_>, source: &Source, options: &ImportOptions) -> PyResult<String> {
-    let converted = py.detach(|| read::to_toml(&source.file, &source.text, options, &read::read_text));
+    let converted = py.detach(|| read::to_toml(&source.file, &source.text, options, &read::read_bytes));
     converted.map(|(text, _)| text).map_err(|found| model_error(py, &found))
 }

@@ -60,6 +60,13 @@ def test_settings_of_reading():
     assert multibody.load(MODELS / "ur5.urdf", limits=True).contact_names
 
 
+def test_models_of_mujoco():
+    text = """<mujoco><worldbody><body name="bob" pos="0 0 1"><joint name="hinge" axis="0 1 0"/>
+        <geom type="sphere" size="0.1" pos="0 0 -1" mass="2"/></body></worldbody></mujoco>"""
+    model = multibody.load(text=text, format="mjcf")
+    assert model.body_names == ["bob"] and abs(model.mass_matrix([0.3])[0, 0] - 2 * (1 + 0.4 * 0.01)) < 1e-12
+
+
 def test_variants():
     docked = MODELS / "variants" / "docking.toml"
     with pytest.raises(multibody.ModelError, match="no variant"):

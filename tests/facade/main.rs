@@ -10,5 +10,6 @@ mod derivatives;
 mod macro_errors;
 pub mod macro_model;
 mod mechanisms;
+mod mjcf;
 mod reference;
 mod variants;

@@ -15,7 +15,8 @@ use serde_json::Value;
 /// Largest error of a state, relative to the largest entry of the quantity.
 const TOLERANCE: f64 = 1e-11;
 
-fn numbers(v: &Value) -> Vec<f64> {
+/// The numbers of a list of lists, or one number.
+pub fn numbers(v: &Value) -> Vec<f64> {
     match v {
         Value::Array(list) => list.iter().flat_map(numbers).collect(),
         v => vec![v.as_f64().expect("a number")],
@@ -89,10 +90,12 @@ fn by_name(plan: &Plan, data: &Value, mut layout: Layout) -> Layout {
     layout
 }
 
-struct Worst(Vec<(String, f64)>);
+/// Quantities and their largest errors.
+pub struct Worst(pub Vec<(String, f64)>);
 
 impl Worst {
-    fn compare(&mut self, what: &str, ours: &[f64], theirs: &[f64]) {
+    /// Compares, relative to the largest entry or 1e-3.
+    pub fn compare(&mut self, what: &str, ours: &[f64], theirs: &[f64]) {
         assert_eq!(ours.len(), theirs.len(), "{what}");
         let size = theirs.iter().fold(1e-3_f64, |m, x| m.max(x.abs()));
         let error = ours.iter().zip(theirs).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs() / size));

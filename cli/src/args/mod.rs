@@ -18,7 +18,7 @@ pub use values::{type_name, HOLD};
 
 const ABOUT: &str = "Symbolic code generator for multibody dynamics in Hamilton's canonical form.
 
-A model (`.toml`, or `.urdf` of a robot) describes rigid bodies, joints and constraints. Its state consists of the coordinates
+A model (`.toml`, `.urdf` of a robot, or `.xml` of MuJoCo) describes rigid bodies, joints and constraints. Its state consists of the coordinates
 q and the momenta p. mbd generates straight-line Rust that computes (q, p) -> (q', p') and other outputs on request; what the
 model does not need costs nothing. An interpreter runs the same equations without generated code.
 
@@ -28,6 +28,7 @@ const EXAMPLES: &str = "Examples:
   mbd                                                 the tour
   mbd check robot.urdf                                is the file sound, and what is in it?
   mbd convert robot.urdf -o robot.toml                the robot in a format that can be added to
+  mbd check humanoid.xml                              the same of a model of MuJoCo, an MJCF file
   mbd count robot.urdf --base floating                what does each sweep cost?
   mbd generate robot.urdf --outputs rates -o robot.rs straight-line Rust
   mbd generate robot.urdf --lang c -o robot.c         the same in C99, with robot.h
@@ -52,7 +53,7 @@ pub struct Arguments {
 pub enum Command {
     /// Read models, and report what is wrong with them or what they contain
     Check(CheckArgs),
-    /// Convert a description, such as a URDF robot, to the TOML format, where it can be changed and added to
+    /// Convert a description, such as a URDF robot or a model of MuJoCo, to the TOML format, where it can be changed and added to
     Convert(ConvertArgs),
     /// Count the operations of every output, sweep by sweep
     Count(CountArgs),
@@ -77,7 +78,7 @@ pub enum Command {
 /// Options of the readers.
 #[derive(Args, Clone, Copy)]
 pub struct ImportArgs {
-    /// Connection of a URDF's root to the ground; a TOML model states it itself
+    /// Connection of a URDF's root to the ground; TOML and MJCF models state it themselves
     #[arg(long, value_parser = choice!(Base), default_value = Base::default().name())]
     pub base: Base,
     /// Gravity in ground axes, m/s², in place of that of the file; a URDF has 0,0,-9.81
@@ -95,10 +96,10 @@ impl ImportArgs {
 /// What a robot touches: options of the readers, for commands to which it makes a difference.
 #[derive(Args, Clone, Copy)]
 pub struct TouchArgs {
-    /// Make stops of the joint limits of a URDF; a TOML model states them itself
+    /// Make stops of the joint limits of a URDF or an MJCF model; a TOML model states them itself
     #[arg(long)]
     pub limits: bool,
-    /// Put a floor at this height that the collision shapes of a URDF touch, m
+    /// Put a floor at this height that the collision shapes of a URDF or the geoms of an MJCF model touch, m
     #[arg(long, value_name = "Z", allow_hyphen_values = true, value_parser = finite)]
     pub floor: Option<f64>,
     /// Coefficient of friction on that floor
@@ -117,7 +118,7 @@ impl TouchArgs {
 /// A model and the options of its reader.
 #[derive(Args)]
 pub struct ModelArgs {
-    /// Description of the mechanism, `.toml` or `.urdf`
+    /// Description of the mechanism, `.toml`, `.urdf` or `.xml`
     pub model: PathBuf,
     #[command(flatten)]
     pub import: ImportArgs,
@@ -138,7 +139,7 @@ With --generated, every file that is listed in manifest.toml of that directory i
 existing file. In continuous integration, this ensures that generated code agrees with its model."
 )]
 pub struct CheckArgs {
-    /// Descriptions of mechanisms, `.toml` or `.urdf`
+    /// Descriptions of mechanisms, `.toml`, `.urdf` or `.xml`
     #[arg(required_unless_present = "generated")]
     pub models: Vec<PathBuf>,
     #[command(flatten)]
@@ -160,11 +161,11 @@ pub struct CheckArgs {
 digits as give it back. What the readers do not use (meshes, colours, comments) is not converted."
 )]
 pub struct ConvertArgs {
-    /// Description of the mechanism, `.toml` or `.urdf`
+    /// Description of the mechanism, `.toml`, `.urdf` or `.xml`
     pub model: PathBuf,
     #[command(flatten)]
     pub import: ImportArgs,
-    /// Make stops of the joint limits of a URDF
+    /// Make stops of the joint limits of a URDF or an MJCF model
     #[arg(long)]
     pub limits: bool,
     /// File to write in place of standard output
@@ -368,7 +369,8 @@ pub struct SimulateArgs {
     /// numbers; print the error of every coordinate at the end, how fast errors grow, and when no digit is left
     #[arg(long, value_enum, value_name = "HOW", num_args = 0..=1, default_missing_value = "tenth")]
     pub trust: Option<Trust>,
-    /// Table to write [default: NAME.csv in the current directory]
+    /// Table to write; Parquet if the name ends in .parquet and the program was built with that feature, else CSV [default:
+    /// NAME.csv in the current directory]
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
     /// Plot to write [default: NAME.svg in the current directory]
@@ -400,6 +402,24 @@ pub struct SimulateArgs {
     /// Number of instants that are drawn
     #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500))]
     pub strobes: u16,
+    /// Let the picture move: the motion in a loop, slowed down or sped up as the caption says, without a script. Readers who
+    /// prefer reduced motion see the still picture
+    #[arg(long, requires = "picture")]
+    pub animate: bool,
+    /// Names in the picture
+    #[arg(long, value_enum, value_name = "WHICH", default_value_t = Names::Auto, requires = "picture")]
+    pub names: Names,
+}
+
+/// What a picture names. A mechanism of many bodies has one colour for each limb, whose last body is named.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Names {
+    /// The bodies, or the last ones of all limbs, where there are at most nine
+    Auto,
+    /// The same, where there are at most twelve
+    All,
+    /// Nothing
+    None,
 }
 
 /// A motion: the model, its start, and how it is computed.

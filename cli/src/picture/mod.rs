@@ -1,23 +1,31 @@
-//! Pictures of a motion: the mechanism at several instants, as SVG text.
+//! Pictures of a motion, as SVG text: the mechanism at several instants, or moving.
 
+mod animate;
+mod base;
+mod flesh;
+mod limbs;
+mod names;
+mod outline;
 mod shapes;
 mod touch;
 mod view;
 
 use std::fmt::Write as _;
 
+use multibody::codegen::model::{Gravity, Value};
 use multibody::codegen::plan::Plan;
 use multibody::codegen::words;
 use multibody::runtime::sweep::FrameState;
 use multibody::runtime::Interpreter;
 
-use super::args::SimulateArgs;
+use super::args::{Names, SimulateArgs};
+use super::ink;
 use super::motion::Record;
-use super::plot::colour;
 use super::{Failure, Outcome};
+use outline::Outline;
 use shapes::{Line, Shapes};
 use touch::{Arrow, Scale, Touch};
-use view::{hull, Page, View};
+use view::{Page, View, HEAD, WIDTH};
 
 /// Settings of a picture.
 pub struct Drawing {
@@ -27,10 +35,16 @@ pub struct Drawing {
     traces: Vec<usize>,
     /// Number of instants.
     strobes: usize,
+    /// Whether the picture moves.
+    moves: bool,
+    /// What is named.
+    names: Names,
 }
 
 /// Largest number of points of a path; more points enlarge the file without a visible difference.
 const POINTS: usize = 400;
+/// Largest number of names that are drawn unasked.
+const FEW: usize = 9;
 
 type Frames = Vec<FrameState<f64>>;
 
@@ -47,138 +61,291 @@ pub fn drawing(plan: &Plan, args: &SimulateArgs) -> Outcome<Drawing> {
     if args.view.is_some_and(|v| v.iter().all(|x| *x == 0.0)) {
         return Err(Failure::new("--view is 0,0,0, which is no direction", "give the direction to the eye, as 0,-1,0"));
     }
-    Ok(Drawing { view: args.view, traces, strobes: usize::from(args.strobes) })
+    let strobes = usize::from(args.strobes);
+    Ok(Drawing { view: args.view, traces, strobes, moves: args.animate, names: args.names })
+}
+
+/// What is drawn of a model, and the record of its motion.
+struct Scene<'a> {
+    record: &'a Record,
+    forces: &'a [Vec<[f64; 3]>],
+    shapes: Shapes,
+    touch: Option<Touch>,
+    interpreter: Interpreter<f64>,
+    /// Number of frames.
+    frames: usize,
+}
+
+/// The mechanism at one time.
+struct Instant {
+    frames: Frames,
+    /// Bodies and solids.
+    lines: Vec<Line>,
+    /// Poses of shapes and places of contacts; empty where there are none.
+    touched: Frames,
+    arrows: Vec<Arrow>,
+}
+
+impl Scene<'_> {
+    /// Index of the last row of the record.
+    fn last(&self) -> usize {
+        self.record.t.len().saturating_sub(1)
+    }
+
+    /// Row of the `k`-th of `n` instants that divide the record evenly.
+    fn row(&self, k: usize, n: usize) -> usize {
+        if n < 2 {
+            self.last()
+        } else {
+            (k * self.last() + (n - 1) / 2) / (n - 1)
+        }
+    }
+
+    fn frames(&mut self, row: usize) -> Frames {
+        let mut out = vec![FrameState::ground(); self.frames];
+        if let (Some(q), Some(v)) = (self.record.q.get(row), self.record.v.get(row)) {
+            self.interpreter.frames(q, v, &mut out);
+        }
+        out
+    }
+
+    fn instant(&mut self, row: usize) -> Instant {
+        let frames = self.frames(row);
+        let mut lines = self.shapes.lines(&frames);
+        let (mut touched, mut arrows) = (Vec::new(), Vec::new());
+        if let (Some(touch), Some(q), Some(v)) = (&mut self.touch, self.record.q.get(row), self.record.v.get(row)) {
+            touched = touch.poses(q, v);
+            lines.extend(touch.solids(&touched, false));
+            arrows = self.forces.get(row).map_or(Vec::new(), |forces| touch.arrows(&touched, forces));
+        }
+        Instant { frames, lines, touched, arrows }
+    }
+
+    /// The path of a frame.
+    fn path(&mut self, frame: usize) -> Vec<[f64; 3]> {
+        let n = POINTS.min(self.last() + 1);
+        (0..n).map(|k| self.frames(self.row(k, n))[frame].position).collect()
+    }
+}
+
+/// What all instants share on the page.
+struct Sheet {
+    page: Page,
+    view: View,
+    scale: Option<Scale>,
+    /// Direction of gravity, if it is known and not zero.
+    down: Option<[f64; 3]>,
+    grounds: Vec<Ground>,
+}
+
+/// A piece of ground: its corners in order, m, and its normal.
+type Ground = ([[f64; 3]; 4], [f64; 3]);
+
+/// The direction of a plan's gravity.
+fn gravity(plan: &Plan) -> Option<[f64; 3]> {
+    let Gravity::Constant(g) = &plan.model.gravity else { return None };
+    let params = plan.default_params();
+    let g = g.map(|x| match x {
+        Value::Const(x) => x,
+        Value::Param(k) => params[k],
+    });
+    let size = g.iter().fold(0.0_f64, |n, x| n.hypot(*x));
+    (size > 0.0 && size.is_finite()).then(|| g.map(|x| x / size))
+}
+
+/// Chooses view and scale so that everything fits on the page.
+fn sheet(plan: &Plan, scene: &Scene, drawing: &Drawing, instants: &[Instant], paths: &[Vec<[f64; 3]>]) -> Sheet {
+    let finite = |p: &[f64; 3]| p.iter().all(|x| x.is_finite());
+    let bare = instants.iter().flat_map(|i| scene.shapes.points(&i.frames)).chain(paths.iter().flatten().copied());
+    let joints: Vec<[f64; 3]> = bare.filter(finite).collect();
+    let flat = flat(plan, drawing, instants, &joints);
+    let mut seen = joints;
+    let mut grounds = Vec::new();
+    if let (Some(touch), Some(last)) = (&scene.touch, instants.last()) {
+        let solids =
+            instants.iter().flat_map(|i| touch.solids(&i.touched, false)).chain(touch.solids(&last.touched, true));
+        seen.extend(solids.flat_map(|line| line.points).filter(finite));
+        grounds = touch.grounds(&last.touched, &seen);
+    }
+    // What moves in a plane is seen from its side, whatever the widths of its shapes.
+    let view = if flat.sees_a_plane() { flat } else { View::new(drawing.view, &seen) };
+    floors(scene, &seen, &mut grounds);
+    let corners = || grounds.iter().flat_map(|(corners, _)| corners.iter().copied());
+    let head = if paths.is_empty() { 0.0 } else { HEAD };
+    let supports = &scene.shapes.supports;
+    let extent = Page::new(seen.iter().map(|p| view.project(*p)), 0.0).size();
+    // Seen from their side, supports have a size on the page, for which its edge has room.
+    let pieces = if view.sees_a_plane() { Vec::new() } else { base::pieces(supports, extent, gravity(plan)) };
+    let all = seen.iter().copied().chain(corners()).chain(pieces.into_iter().flatten());
+    let all: Vec<[f64; 2]> = all.map(|p| view.project(p)).collect();
+    let mut page = Page::new(all.iter().copied(), head);
+    // Forces that are nothing but round-off are none.
+    let params = plan.default_params();
+    let mass = |v: Value| match v {
+        Value::Const(x) => x,
+        Value::Param(k) => params[k],
+    };
+    let least = 1e-8 * plan.model.bodies.iter().map(|b| mass(b.mass)).sum::<f64>();
+    let scale = Scale::new(instants.iter().flat_map(|i| &i.arrows), &page, least);
+    if let Some(scale) = &scale {
+        // Arrows fit on the page too.
+        let ends = instants.iter().flat_map(|i| &i.arrows);
+        let ends = ends.map(|(p, f)| view.project(std::array::from_fn(|k| p[k] + scale.metres * f[k])));
+        page = Page::new(all.iter().copied().chain(ends), head);
+    }
+    Sheet { page, view, scale, down: gravity(plan), grounds }
+}
+
+/// The view of a mechanism whose joints move in a plane, whatever the widths of its bodies, or else one in space.
+fn flat(plan: &Plan, drawing: &Drawing, instants: &[Instant], seen: &[[f64; 3]]) -> View {
+    let origins = instants.iter().flat_map(|i| i.frames.iter().map(|f| f.position));
+    let origins: Vec<[f64; 3]> = origins.filter(|p| p.iter().all(|x| x.is_finite())).collect();
+    let view = View::new(drawing.view, &origins);
+    // A single body says nothing of a plane.
+    let moves = plan.model.bodies.len() > 1 && origins.iter().any(|p| *p != origins[0]);
+    let view = if view.sees_a_plane() && moves { view } else { View::new(drawing.view, seen) };
+    // What stands on a floor is not seen from above unasked.
+    let above = drawing.view.is_none() && view.depth([0.0, 0.0, 1.0]).abs() > 0.999;
+    match above && !plan.model.contacts.is_empty() {
+        true => View::new(Some(view::OBLIQUE), seen),
+        false => view,
+    }
+}
+
+/// Adds the floors on which something rolls, as far as the mechanism goes.
+fn floors(scene: &Scene, seen: &[[f64; 3]], grounds: &mut Vec<Ground>) {
+    for floor in scene.shapes.floors.iter().filter(|f| f.iter().all(|x| x.is_finite())) {
+        let known = grounds.iter().any(|(corners, _)| (corners[0][2] - floor[2]).abs() < 1e-9);
+        let range = |k: usize| seen.iter().fold((floor[k], floor[k]), |(a, b), p| (a.min(p[k]), b.max(p[k])));
+        let ((a, b), (c, d)) = (range(0), range(1));
+        let pad = 0.05 * (b - a).max(d - c);
+        if !known {
+            let corner = |(x, y): (f64, f64)| [x, y, floor[2]];
+            let all = [(a - pad, c - pad), (b + pad, c - pad), (b + pad, d + pad), (a - pad, d + pad)];
+            grounds.push((all.map(corner), [0.0, 0.0, 1.0]));
+        }
+    }
 }
 
 /// The picture. `forces` are those of the contacts, along their rows, for every time of the record; nothing where none are
 /// known.
 pub fn svg(plan: &Plan, record: &Record, forces: &[Vec<[f64; 3]>], drawing: &Drawing) -> String {
-    let shapes = Shapes::new(plan);
-    let mut touch = Touch::new(plan);
-    let mut interpreter: Interpreter<f64> = plan.default_interpreter();
-    let mut frames = |row: usize| -> Frames {
-        let mut out = vec![FrameState::ground(); plan.frames.len()];
-        interpreter.frames(&record.q[row], &record.v[row], &mut out);
-        out
+    let (shapes, touch) = (Shapes::new(plan), Touch::new(plan));
+    let interpreter = plan.default_interpreter();
+    let mut scene = Scene { record, forces, shapes, touch, interpreter, frames: plan.frames.len() };
+    let rows: Vec<usize> = (0..drawing.strobes).map(|k| scene.row(k, drawing.strobes)).collect();
+    let still: Vec<Instant> = rows.into_iter().map(|row| scene.instant(row)).collect();
+    let moving: Vec<Instant> = match drawing.moves {
+        true => animate::rows(&scene).into_iter().map(|row| scene.instant(row)).collect(),
+        false => Vec::new(),
     };
-    let last = record.t.len() - 1;
-    let part = |k: usize, n: usize| if n < 2 { last } else { (k * last + (n - 1) / 2) / (n - 1) };
-    let rows: Vec<usize> = (0..drawing.strobes).map(|k| part(k, drawing.strobes)).collect();
-    let instants: Vec<Frames> = rows.iter().map(|row| frames(*row)).collect();
-    // Poses of shapes and places of contacts.
-    let touched: Vec<Frames> = match &mut touch {
-        Some(touch) => rows.iter().map(|&row| touch.poses(&record.q[row], &record.v[row])).collect(),
-        None => Vec::new(),
+    let paths: Vec<Vec<[f64; 3]>> = drawing.traces.iter().map(|f| scene.path(*f)).collect();
+    let sheet = sheet(plan, &scene, drawing, if drawing.moves { &moving } else { &still }, &paths);
+    let end = record.t.last().copied().unwrap_or_default();
+    let caption = match (drawing.moves, drawing.strobes) {
+        (true, _) => animate::caption(end),
+        (_, 1) => format!("t = {end} s"),
+        (_, n) => format!("{n} instants from 0 to {end} s"),
     };
-    let arrows: Vec<Vec<Arrow>> = touched
-        .iter()
-        .zip(&rows)
-        .map(|(poses, &row)| match (&touch, forces.get(row)) {
-            (Some(touch), Some(forces)) => touch.arrows(poses, forces),
-            _ => Vec::new(),
-        })
-        .collect();
-    let paths: Vec<Vec<[f64; 3]>> = match drawing.traces.is_empty() {
-        true => Vec::new(),
-        false => {
-            let n = POINTS.min(last + 1);
-            let all: Vec<Frames> = (0..n).map(|k| frames(part(k, n))).collect();
-            drawing.traces.iter().map(|&f| all.iter().map(|a| a[f].position).collect()).collect()
-        }
-    };
-    let seen = instants.iter().flat_map(|f| shapes.points(f)).chain(paths.iter().flatten().copied());
-    let mut seen: Vec<[f64; 3]> = seen.filter(|p| p.iter().all(|x| x.is_finite())).collect();
-    let flat = View::new(drawing.view, &seen);
-    let mut grounds = Vec::new();
-    if let (Some(touch), Some(poses)) = (&touch, touched.last()) {
-        let solids = touched.iter().flat_map(|poses| touch.solids(poses, false)).chain(touch.solids(poses, true));
-        seen.extend(solids.flat_map(|line| line.points).filter(|p| p.iter().all(|x| x.is_finite())));
-        grounds = touch.grounds(poses, &seen);
+    let Sheet { page, view, scale, down, .. } = &sheet;
+    let mut text = ink::head([WIDTH, page.height + view::FOOT], &format!("{}: {caption}", plan.model.name));
+    still_parts(&mut text, &scene, &sheet, still.last());
+    let names: Vec<String> = drawing.traces.iter().map(|f| plan.frames[*f].name.clone()).collect();
+    names::legend(&mut text, &names);
+    if drawing.moves {
+        animate::draw(&mut text, &sheet, &moving, &paths, end);
+        text.push_str("<g class=\"still\">\n");
     }
-    // What moves in a plane is seen from its side, whatever the widths of its shapes.
-    let view = if flat.sees_a_plane() { flat } else { View::new(drawing.view, &seen) };
-    let corners = grounds.iter().flat_map(|(corners, _)| corners.iter());
-    let mut page = Page::new(seen.iter().chain(corners).map(|p| view.project(*p)));
-    let scale = Scale::new(arrows.iter().flatten(), &page);
-    if let Some(scale) = &scale {
-        // Arrows fit on the page too.
-        let ends = arrows.iter().flatten().map(|(p, f)| std::array::from_fn(|k| p[k] + scale.metres * f[k]));
-        let corners = grounds.iter().flat_map(|(corners, _)| corners.iter().copied());
-        page = Page::new(seen.iter().copied().chain(corners).chain(ends).map(|p| view.project(p)));
+    strobes(&mut text, &sheet, &still);
+    for (k, path) in paths.iter().enumerate() {
+        let d = path_of(&sheet, path);
+        let _ = writeln!(text, "<path class=\"n ink{}\" stroke-width=\"1.4\" d=\"{d}\"/>", names::dashes(k));
     }
-    let mut text = page.head();
-    grounds.iter().for_each(|ground| touch::ground(&mut text, &page, &view, ground));
-    if let (Some(touch), Some(poses)) = (&touch, touched.last()) {
-        touch.solids(poses, true).iter().for_each(|line| body(&mut text, &page, &view, line, "#888"));
+    name_bodies(&mut text, &scene, &sheet, drawing, &still, &paths);
+    if drawing.moves {
+        text.push_str("</g>\n");
     }
-    let still = vec![FrameState::ground(); plan.frames.len()];
-    body(&mut text, &page, &view, &shapes.ground(&still), "#777");
-    for (k, frames) in instants.iter().enumerate() {
-        let fade = if drawing.strobes < 2 { 1.0 } else { k as f64 / (drawing.strobes - 1) as f64 };
-        let opacity = 0.14 + 0.86 * fade * fade * fade;
+    base::foot(&mut text, (page, view), &caption, scale.as_ref().map(|scale| scale.metres), *down);
+    text + "</svg>\n"
+}
+
+/// Floors, walls, supports, and solids on the ground.
+fn still_parts(text: &mut String, scene: &Scene, sheet: &Sheet, last: Option<&Instant>) {
+    let Sheet { page, view, down, grounds, .. } = sheet;
+    grounds.iter().for_each(|ground| touch::ground(text, page, view, ground));
+    if let (Some(touch), Some(last)) = (&scene.touch, last) {
+        touch.solids(&last.touched, true).iter().for_each(|line| Outline::new(line, page, view).draw(text, false));
+    }
+    base::supports(text, page, view, &scene.shapes.supports, *down);
+}
+
+/// The path of a frame on the page.
+fn path_of(sheet: &Sheet, path: &[[f64; 3]]) -> String {
+    let places = path.iter().map(|p| sheet.page.place(sheet.view.project(*p)));
+    let list: Vec<String> =
+        places.filter(|p| p.iter().all(|x| x.is_finite())).map(|[x, y]| format!("{x:.1} {y:.1}")).collect();
+    if list.is_empty() {
+        String::new()
+    } else {
+        format!("M{}", list.join("L"))
+    }
+}
+
+/// Indices of the parts from the farthest to the nearest; parts at the same distance keep their order in spite of rounding.
+fn by_depth(sheet: &Sheet, lines: &[Line]) -> Vec<usize> {
+    let depth: Vec<f64> =
+        lines.iter().map(|line| (sheet.view.depth(line.middle()) / (1e-6 * sheet.page.size())).round()).collect();
+    let mut order: Vec<usize> = (0..lines.len()).collect();
+    order.sort_by(|a, b| depth[*a].total_cmp(&depth[*b]));
+    order
+}
+
+/// The instants, the last one in full colour.
+fn strobes(text: &mut String, sheet: &Sheet, instants: &[Instant]) {
+    for (k, instant) in instants.iter().enumerate() {
+        let last = k + 1 == instants.len();
+        let part = (k + 1) as f64 / instants.len() as f64;
+        let opacity = if last { 1.0 } else { 0.12 + 0.26 * part * part };
         let _ = writeln!(text, "<g opacity=\"{opacity:.2}\">");
-        let mut lines = shapes.lines(frames);
-        if let (Some(touch), Some(poses)) = (&touch, touched.get(k)) {
-            lines.extend(touch.solids(poses, false));
+        for at in by_depth(sheet, &instant.lines) {
+            Outline::new(&instant.lines[at], &sheet.page, &sheet.view).draw(text, last);
         }
-        // Nearer parts are drawn over those behind them; parts at the same distance keep their order in spite of
-        // rounding.
-        let depth = |line: &Line| (view.depth(line.middle()) / (1e-6 * page.size())).round();
-        lines.sort_by(|a, b| depth(a).total_cmp(&depth(b)));
-        for line in &lines {
-            body(&mut text, &page, &view, line, &hsl(line.colour));
-        }
-        if let (Some(scale), Some(arrows)) = (&scale, arrows.get(k)) {
-            arrows.iter().for_each(|arrow| scale.draw(&mut text, &page, &view, arrow));
+        if let Some(scale) = &sheet.scale {
+            instant.arrows.iter().for_each(|arrow| scale.draw(text, &sheet.page, &sheet.view, arrow));
         }
         text.push_str("</g>\n");
     }
-    for (k, path) in paths.iter().enumerate() {
-        let points: Vec<String> = path.iter().map(|p| page.at(view.project(*p))).collect();
-        let colour = ["#c00000", "#0050b0", "#208020"][k % 3];
-        let points = points.join(" ");
-        let _ =
-            writeln!(text, "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.3\"/>");
-    }
-    text + &page.foot(&caption(record, drawing), scale.as_ref().map(|scale| scale.metres))
 }
 
-/// The caption below the picture.
-fn caption(record: &Record, drawing: &Drawing) -> String {
-    let end = record.t.last().copied().unwrap_or_default();
-    match drawing.strobes {
-        1 => format!("t = {end} s"),
-        n => format!("{n} instants from 0 to {end} s"),
-    }
-}
-
-fn hsl(k: usize) -> String {
-    let c = colour(k);
-    format!("hsl({:.0},{:.0}%,{:.0}%)", c.0 * 360.0, c.1 * 100.0, c.2 * 100.0)
-}
-
-/// One body: its outline and the marks of its joints.
-fn body(text: &mut String, page: &Page, view: &View, line: &Line, colour: &str) {
-    let points: Vec<[f64; 2]> = line.points.iter().map(|p| view.project(*p)).collect();
-    let outline = if line.closed { points.clone() } else { hull(&points, line.flat * page.size()) };
-    let list: Vec<String> = outline.iter().map(|p| page.at(*p)).collect();
-    let (list, width) = (list.join(" "), line.width);
-    let _ = match outline.len() {
-        0 | 1 => Ok(()),
-        2 => writeln!(text, "<polyline points=\"{list}\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linecap=\"round\"/>"),
-        _ => writeln!(
-            text,
-            "<polygon points=\"{list}\" fill=\"{colour}\" fill-opacity=\".18\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"/>"
-        ),
+/// The names of the bodies at the last instant.
+fn name_bodies(
+    text: &mut String,
+    scene: &Scene,
+    sheet: &Sheet,
+    drawing: &Drawing,
+    still: &[Instant],
+    paths: &[Vec<[f64; 3]>],
+) {
+    let named = &scene.shapes.named;
+    let wanted = match drawing.names {
+        Names::Auto => named.len() <= FEW,
+        Names::All => true,
+        Names::None => false,
     };
-    for (mark, square) in &line.marks {
-        let [x, y] = page.place(view.project(*mark));
-        let _ = match square {
-            true => {
-                let (x, y) = (x - 5.0, y - 5.0);
-                writeln!(text, "<rect x=\"{x:.1}\" y=\"{y:.1}\" width=\"10\" height=\"10\" fill=\"#fff\" stroke=\"{colour}\" stroke-width=\"1.5\"/>")
-            }
-            false => writeln!(text, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.5\" fill=\"#fff\" stroke=\"{colour}\" stroke-width=\"1.3\"/>"),
-        };
+    let Some(last) = still.last().filter(|_| wanted) else { return };
+    let Sheet { page, view, .. } = sheet;
+    let place = |p: [f64; 3]| page.place(view.project(p));
+    let at = |frame: usize| {
+        // A body whose shape contacts know is named at its centre.
+        scene.shapes.middle(frame, &last.frames).unwrap_or(last.frames[frame].position)
+    };
+    let names: Vec<names::Named> = named.iter().map(|(frame, name, k)| (place(at(*frame)), name.clone(), *k)).collect();
+    let outlines = last.lines.iter().map(|line| Outline::new(line, page, view));
+    let mut drawn: Vec<[f64; 2]> = outlines.flat_map(|o| names::covered(&o.corners, o.width)).collect();
+    drawn.extend(paths.iter().flatten().map(|p| place(*p)));
+    if let Some(scale) = &sheet.scale {
+        drawn.extend(last.arrows.iter().flat_map(|arrow| names::grains(&scale.ends(page, view, arrow))));
     }
+    let top = if paths.is_empty() { 4.0 } else { HEAD };
+    names::draw(text, &names, &drawn, [top, page.height + 6.0]);
 }

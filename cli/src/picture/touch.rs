@@ -9,6 +9,7 @@ use multibody::runtime::sweep::FrameState;
 use multibody::runtime::tree::Closure;
 use multibody::runtime::Interpreter;
 
+use super::limbs;
 use super::shapes::Line;
 use super::view::{Page, View};
 
@@ -20,8 +21,6 @@ const AROUND: usize = 48;
 const LONGEST: f64 = 0.16;
 /// Forces below this part of the largest one are not drawn.
 const SMALL: f64 = 0.02;
-/// Colour of forces: a vermillion that colour-blind readers tell from greys and blues.
-const FORCE: &str = "#d55e00";
 
 /// A plane: the frame that carries it and its normal there.
 struct Plane {
@@ -35,7 +34,7 @@ struct Plane {
 struct Solid {
     frame: usize,
     points: Vec<[f64; 3]>,
-    body: Option<usize>,
+    colour: Option<usize>,
 }
 
 /// A place where two bodies can touch: geometry, frames, and directions of their z.
@@ -83,7 +82,7 @@ fn unit(a: [f64; 3]) -> [f64; 3] {
 }
 
 /// Two directions that form a right-handed triple with a unit vector behind them.
-fn across(n: [f64; 3]) -> [[f64; 3]; 2] {
+pub fn across(n: [f64; 3]) -> [[f64; 3]; 2] {
     let k = (0..3).min_by(|a, b| n[*a].abs().total_cmp(&n[*b].abs())).unwrap_or_default();
     let mut x = times(-n[k], n);
     x[k] += 1.0;
@@ -106,7 +105,7 @@ fn product(a: &Mat3<f64>, b: &Mat3<f64>) -> Mat3<f64> {
 }
 
 /// Points on an ellipsoid about a place.
-fn ellipsoid(middle: [f64; 3], semi_axes: [f64; 3]) -> Vec<[f64; 3]> {
+pub fn ellipsoid(middle: [f64; 3], semi_axes: [f64; 3]) -> Vec<[f64; 3]> {
     let angle = |k: usize| std::f64::consts::TAU * k as f64 / AROUND as f64;
     let ring = |i: usize| {
         let (s, c) = angle(i).sin_cos();
@@ -145,6 +144,11 @@ impl Touch {
         if model.shapes.is_empty() {
             return None;
         }
+        let params = plan.default_params();
+        let colours = limbs::colours(&plan.model, &|v| match v {
+            Value::Const(x) => x,
+            Value::Param(k) => params[k],
+        });
         let mut names = Vec::new();
         let mut add = |mount: &Mount| {
             // A control character is in no name of the model.
@@ -169,12 +173,11 @@ impl Touch {
                 ref kind => {
                     let points = surface(kind);
                     if !points.is_empty() {
-                        solids.push(Solid { frame, points, body: shape.mount.body });
+                        solids.push(Solid { frame, points, colour: shape.mount.body.map(|b| colours[b]) });
                     }
                 }
             }
         }
-        let params = plan.default_params();
         let mut places = Vec::new();
         for contact in &plan.model.contacts {
             places.push(match &contact.kind {
@@ -211,17 +214,10 @@ impl Touch {
 
     /// Solids on bodies (`ground` false) or on the ground.
     pub fn solids(&self, poses: &[FrameState<f64>], ground: bool) -> Vec<Line> {
-        let solids = self.solids.iter().filter(|s| s.body.is_none() == ground).map(|solid| {
+        let solids = self.solids.iter().filter(|s| s.colour.is_none() == ground).map(|solid| {
             let at = &poses[solid.frame];
             let points = solid.points.iter().map(|p| plus(at.position, rotated(&at.rotation, *p))).collect();
-            Line {
-                points,
-                closed: false,
-                flat: ROUND,
-                marks: Vec::new(),
-                colour: solid.body.unwrap_or_default(),
-                width: 1.4,
-            }
+            Line { points, closed: false, flat: ROUND, marks: Vec::new(), colour: solid.colour, radius: 0.0 }
         });
         let faces = self.planes.iter().filter(|_| !ground).filter_map(|plane| {
             let (at, half) = (&poses[plane.frame], 0.5 * plane.patch?);
@@ -230,7 +226,7 @@ impl Touch {
                 plus(at.position, rotated(&at.rotation, plus(times(i * half, x), times(k * half, y))))
             };
             let points = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(corner).to_vec();
-            Some(Line { points, closed: false, flat: ROUND, marks: Vec::new(), colour: 0, width: 1.4 })
+            Some(Line { points, closed: false, flat: ROUND, marks: Vec::new(), colour: Some(0), radius: 0.0 })
         });
         solids.chain(faces).collect()
     }
@@ -286,7 +282,7 @@ pub fn ground(text: &mut String, page: &Page, view: &View, (corners, normal): &(
     if view.depth(*normal).abs() > 0.03 {
         let list: Vec<String> = at.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
         let list = list.join(" ");
-        let _ = writeln!(text, "<polygon points=\"{list}\" fill=\"#f0f0ec\" stroke=\"#b8b8b0\" stroke-width=\"1\"/>");
+        let _ = writeln!(text, "<polygon class=\"floor\" points=\"{list}\"/>");
         return;
     }
     // The two corners that are farthest apart on the page.
@@ -294,21 +290,25 @@ pub fn ground(text: &mut String, page: &Page, view: &View, (corners, normal): &(
     let far = |(i, k): &(usize, usize)| (at[*i][0] - at[*k][0]).hypot(at[*i][1] - at[*k][1]);
     let Some((i, k)) = pairs.max_by(|a, b| far(a).total_cmp(&far(b))) else { return };
     let ([x1, y1], [x2, y2], length) = (at[i], at[k], far(&(i, k)));
-    let _ = writeln!(text, "<path d=\"M{x1:.1},{y1:.1} L{x2:.1},{y2:.1}\" stroke=\"#666\" stroke-width=\"1.4\"/>");
     let along = [(x2 - x1) / length, (y2 - y1) / length];
     let [u, w] = view.project(*normal);
     // Down the page is positive.
-    let behind = [-u, w];
+    hatched(text, [x1, y1], along, length, [-u, w]);
+}
+
+/// A line on the page with hatches behind it.
+pub fn hatched(text: &mut String, [x, y]: [f64; 2], along: [f64; 2], length: f64, behind: [f64; 2]) {
+    let (u, v) = (x + length * along[0], y + length * along[1]);
+    let _ = writeln!(text, "<path class=\"axis\" stroke-width=\"1.4\" d=\"M{x:.1} {y:.1}L{u:.1} {v:.1}\"/>");
+    let step = 9.0_f64.max(length / 200.0);
+    let count = (length / step).floor().max(1.0) as usize;
+    let [dx, dy] = [0, 1].map(|k| 6.0 * (behind[k] - 0.7 * along[k]));
     let mut d = String::new();
-    let step = 9.0;
-    let mut s = 0.5 * step;
-    while s < length {
-        let [x, y] = [x1 + s * along[0], y1 + s * along[1]];
-        let end = [0, 1].map(|k| 7.0 * (behind[k] - 0.7 * along[k]));
-        let _ = write!(d, "M{x:.1},{y:.1} l{:.1},{:.1} ", end[0], end[1]);
-        s += step;
+    for k in 0..count {
+        let s = (k as f64 + 0.6) * length / count as f64;
+        let _ = write!(d, "M{:.1} {:.1}l{dx:.1} {dy:.1}", x + s * along[0], y + s * along[1]);
     }
-    let _ = writeln!(text, "<path d=\"{}\" stroke=\"#aaa\" stroke-width=\"0.9\" fill=\"none\"/>", d.trim_end());
+    let _ = writeln!(text, "<path class=\"axis\" stroke-opacity=\".6\" d=\"{d}\"/>");
 }
 
 /// Lengths of arrows.
@@ -320,43 +320,44 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// The scale with which the largest of some forces has a good length; `None` where there are none.
-    pub fn new<'a>(arrows: impl Iterator<Item = &'a Arrow>, page: &Page) -> Option<Scale> {
+    /// The scale with which the largest of some forces has a good length; `None` where all are at most `least`, N.
+    pub fn new<'a>(arrows: impl Iterator<Item = &'a Arrow>, page: &Page, least: f64) -> Option<Scale> {
         let largest = arrows.map(|(_, f)| norm(*f)).filter(|f| f.is_finite()).fold(0.0, f64::max);
-        (largest > 0.0).then(|| Scale { metres: LONGEST * page.size() / largest, largest })
+        (largest > least).then(|| Scale { metres: LONGEST * page.size() / largest, largest })
+    }
+
+    /// Both ends on the page of an arrow that starts where the force acts; the same place twice for a small force.
+    pub fn ends(&self, page: &Page, view: &View, (point, force): &Arrow) -> [[f64; 2]; 2] {
+        let metres = if norm(*force) < SMALL * self.largest { 0.0 } else { self.metres };
+        [0.0, metres].map(|m| page.place(view.project(plus(*point, times(m, *force)))))
     }
 
     /// An arrow that starts where the force acts.
-    pub fn draw(&self, text: &mut String, page: &Page, view: &View, (point, force): &Arrow) {
-        if norm(*force) < SMALL * self.largest {
-            return;
-        }
-        let from = page.place(view.project(*point));
-        let to = page.place(view.project(plus(*point, times(self.metres, *force))));
-        arrow(text, from, to);
+    pub fn draw(&self, text: &mut String, page: &Page, view: &View, force: &Arrow) {
+        let [from, to] = self.ends(page, view, force);
+        arrow(text, from, to, "force");
     }
 }
 
-/// An arrow in places of the page, with a white edge that sets it off from what is behind it.
-pub fn arrow(text: &mut String, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) {
+/// An arrow in places of the page, with an edge of paper that sets it off from what is behind it.
+pub fn arrow(text: &mut String, from: [f64; 2], to: [f64; 2], class: &str) {
+    let Some([shaft, tip]) = arrow_paths(from, to) else { return };
+    for (class, width, edge) in [("halo", 4.6, 2.6), (class, 2.0, 0.0)] {
+        let _ = writeln!(text, "<path class=\"{class}\" stroke-width=\"{width}\" d=\"{shaft}\"/>");
+        let _ = writeln!(text, "<path class=\"{class}\" stroke-width=\"{edge}\" d=\"{tip}\"/>");
+    }
+}
+
+/// Shaft and tip of an arrow; `None` for one that is too short to see.
+pub fn arrow_paths([x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Option<[String; 2]> {
     let length = (x2 - x1).hypot(y2 - y1);
-    if length < 2.0 {
-        return;
+    if length.is_nan() || length < 2.0 {
+        return None;
     }
     let (u, v) = ((x2 - x1) / length, (y2 - y1) / length);
     let head = length.min(9.0);
     let (bx, by) = (x2 - head * u, y2 - head * v);
-    let wing = 0.42 * head;
-    let tip = format!(
-        "M{x2:.1},{y2:.1} L{:.1},{:.1} L{:.1},{:.1} Z",
-        bx - wing * v,
-        by + wing * u,
-        bx + wing * v,
-        by - wing * u
-    );
-    let shaft = format!("M{x1:.1},{y1:.1} L{bx:.1},{by:.1}");
-    for (colour, width, edge) in [("#fff", 4.6, 2.6), (FORCE, 2.0, 0.0)] {
-        let _ = writeln!(text, "<path d=\"{shaft}\" stroke=\"{colour}\" stroke-width=\"{width}\" fill=\"none\"/>");
-        let _ = writeln!(text, "<path d=\"{tip}\" fill=\"{colour}\" stroke=\"{colour}\" stroke-width=\"{edge}\"/>");
-    }
+    let (wx, wy) = (0.42 * head * -v, 0.42 * head * u);
+    let tip = format!("M{x2:.1} {y2:.1}L{:.1} {:.1}L{:.1} {:.1}Z", bx + wx, by + wy, bx - wx, by - wy);
+    Some([format!("M{x1:.1} {y1:.1}L{bx:.1} {by:.1}"), tip])
 }

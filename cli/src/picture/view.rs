@@ -1,9 +1,5 @@
 //! Projection from space onto the page.
 
-use std::fmt::Write as _;
-
-use super::touch::arrow;
-
 /// A parallel projection.
 pub struct View {
     right: [f64; 3],
@@ -24,6 +20,9 @@ fn unit(a: [f64; 3]) -> [f64; 3] {
     a.map(|x| x / norm)
 }
 
+/// Direction to the eye where the mechanism does not move in a plane.
+pub const OBLIQUE: [f64; 3] = [0.5, -1.0, 0.45];
+
 impl View {
     /// The projection along a direction; if none is given, along the normal of the plane in which all points lie.
     pub fn new(direction: Option<[f64; 3]>, points: &[[f64; 3]]) -> View {
@@ -34,7 +33,7 @@ impl View {
         let flat = 1e-6 * extent.iter().fold(0.0, |m: f64, x| m.max(*x));
         let planes = [(1, [0.0, -1.0, 0.0]), (0, [1.0, 0.0, 0.0]), (2, [0.0, 0.0, 1.0])];
         let across = planes.into_iter().find(|(k, _)| extent[*k] <= flat).map(|(_, direction)| direction);
-        let eye = unit(direction.or(across).unwrap_or([0.5, -1.0, 0.45]));
+        let eye = unit(direction.or(across).unwrap_or(OBLIQUE));
         let above = if eye[2].abs() > 0.999 { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] };
         let right = unit(cross(above, eye));
         View { right, up: cross(eye, right), eye }
@@ -87,33 +86,31 @@ pub fn hull(points: &[[f64; 2]], flat: f64) -> Vec<[f64; 2]> {
 }
 
 /// Width of the picture, pixels.
-const WIDTH: f64 = 720.0;
+pub const WIDTH: f64 = 720.0;
+/// Least and largest height of the mechanism's part of the picture, pixels.
 const HEIGHTS: [f64; 2] = [200.0, 640.0];
-const MARGIN: f64 = 24.0;
-/// Height of the scale and the caption below the picture, pixels.
-const FOOT: f64 = 34.0;
-
-/// The largest number of one digit, 1, 2 or 5, that is at most `x`.
-fn round(x: f64) -> f64 {
-    let decade = 10.0_f64.powf(x.log10().floor());
-    [5.0, 2.0, 1.0].into_iter().map(|m| m * decade).find(|l| *l <= x).unwrap_or(decade)
-}
+/// Edge around the mechanism, which has room for names, pixels.
+pub const MARGIN: f64 = 38.0;
+/// Height of the legend above the picture, and of the scale and the caption below it, pixels.
+pub const HEAD: f64 = 26.0;
+pub const FOOT: f64 = 44.0;
 
 /// Scale and place.
 pub struct Page {
     /// Pixels per metre.
-    scale: f64,
+    pub scale: f64,
     left: f64,
     top: f64,
-    height: f64,
+    /// Height above the foot, pixels.
+    pub height: f64,
     size: f64,
 }
 
 impl Page {
-    /// A page on which all points fit.
-    pub fn new(points: impl Iterator<Item = [f64; 2]>) -> Page {
+    /// A page on which all points fit below a head of some pixels.
+    pub fn new(points: impl Iterator<Item = [f64; 2]>, head: f64) -> Page {
         let (mut low, mut high) = ([f64::MAX; 2], [f64::MIN; 2]);
-        for p in points {
+        for p in points.filter(|p| p.iter().all(|x| x.is_finite())) {
             low = std::array::from_fn(|k| low[k].min(p[k]));
             high = std::array::from_fn(|k| high[k].max(p[k]));
         }
@@ -126,8 +123,8 @@ impl Page {
         let scale = (inner / extent[0].max(1e-3 * size)).min((HEIGHTS[1] - 2.0 * MARGIN) / extent[1].max(1e-3 * size));
         let height = (extent[1] * scale + 2.0 * MARGIN).clamp(HEIGHTS[0], HEIGHTS[1]);
         let left = (WIDTH - extent[0] * scale) / 2.0 - low[0] * scale;
-        let top = (height + extent[1] * scale) / 2.0 + low[1] * scale;
-        Page { scale, left, top, height, size }
+        let top = head + (height + extent[1] * scale) / 2.0 + low[1] * scale;
+        Page { scale, left, top, height: head + height, size }
     }
 
     /// The larger extent, m.
@@ -138,44 +135,5 @@ impl Page {
     /// A point on the page.
     pub fn place(&self, p: [f64; 2]) -> [f64; 2] {
         [self.left + p[0] * self.scale, self.top - p[1] * self.scale]
-    }
-
-    /// The same as text.
-    pub fn at(&self, p: [f64; 2]) -> String {
-        let [x, y] = self.place(p);
-        format!("{x:.1},{y:.1}")
-    }
-
-    /// The beginning of the file.
-    pub fn head(&self) -> String {
-        let height = self.height + FOOT;
-        format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height:.0}\" viewBox=\"0 0 {WIDTH} {height:.0}\">\n\
-             <rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n"
-        )
-    }
-
-    /// The scale, that of forces in m on the page per N where there are any, the caption, and the end of the file.
-    pub fn foot(&self, caption: &str, force: Option<f64>) -> String {
-        let length = round(WIDTH / 6.0 / self.scale);
-        let (x, y, to) = (MARGIN, self.height + FOOT / 2.0, MARGIN + length * self.scale);
-        let mut text = String::new();
-        let _ =
-            writeln!(text, "<path d=\"M{x},{} v8 m0,-4 H{to:.1} m0,-4 v8\" stroke=\"#444\" fill=\"none\"/>", y - 4.0);
-        let font = "font-family=\"sans-serif\" font-size=\"12\" fill=\"#444\"";
-        let _ = writeln!(text, "<text x=\"{:.1}\" y=\"{}\" {font}>{length} m</text>", to + 8.0, y + 4.0);
-        let _ = writeln!(
-            text,
-            "<text x=\"{}\" y=\"{}\" {font} text-anchor=\"end\">{caption}</text>",
-            WIDTH - MARGIN,
-            y + 4.0
-        );
-        if let Some(metres) = force {
-            let newtons = round(WIDTH / 8.0 / (metres * self.scale));
-            let (from, to) = (to + 92.0, to + 92.0 + newtons * metres * self.scale);
-            arrow(&mut text, [from, y], [to, y]);
-            let _ = writeln!(text, "<text x=\"{:.1}\" y=\"{}\" {font}>{newtons} N</text>", to + 8.0, y + 4.0);
-        }
-        text + "</svg>\n"
     }
 }

@@ -218,11 +218,11 @@ fn pictures_show_what_touches_and_its_forces() {
             // 2 kg on an incline of 30 degrees press with 17 N: 10 N is a scale for them.
             assert!(picture.contains(">10 N</text>") || picture.contains(">5 N</text>"), "{picture}");
             assert!(
-                picture.contains("fill=\"#f0f0ec\"") || picture.contains("stroke=\"#aaa\""),
+                picture.contains("class=\"floor\"") || picture.contains("stroke-opacity=\".6\""),
                 "no incline: {picture}"
             );
             // At least two corners carry the block at each of four instants; the scale is an arrow too.
-            let arrows = picture.matches("stroke=\"#d55e00\" stroke-width=\"2\"").count();
+            let arrows = picture.matches("class=\"force\" stroke-width=\"2\"").count();
             assert!((4 * 2 + 1..=4 * 4 + 1).contains(&arrows), "{arrows} arrows: {picture}");
         }
         std::fs::read_to_string(folder.join("block_on_incline.csv")).expect("a table")

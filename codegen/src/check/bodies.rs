@@ -1,14 +1,15 @@
 //! Bodies: masses, inertias, sizes.
 
 use super::numbers::{Numbers, Quantity};
-use super::symmetric::eigenvalues;
 use super::{is_zero, merged};
 use crate::diag::Severity;
 use crate::import::raw::{RawBody, RawModel};
 use crate::import::source::Findings;
 use crate::import::words::quote;
+use crate::inertia::at_default;
 use crate::model::{Body, Joint, Param, Rotation, Value};
 use crate::rounded_once::norm;
+use crate::symmetric::eigenvalues;
 
 /// Slack of the triangle inequality and of positivity, relative to the largest moment: numbers written with seven
 /// digits pass.
@@ -59,9 +60,9 @@ pub(super) fn inertias(raw: &RawModel, bodies: &[Body], joints: &[Joint], params
     let together = merged::together(bodies, joints, params);
     for ((source, body), together) in raw.bodies.iter().zip(bodies).zip(together) {
         let Some(at) = &source.inertia else { continue };
-        let entries = body.inertia.map(|v| merged::at_default(v, params));
+        let entries = body.inertia.map(|v| at_default(v, params));
         let Some(moments) = eigenvalues(entries) else { continue };
-        let mass = merged::at_default(body.mass, params);
+        let mass = at_default(body.mass, params);
         let by_default = body.inertia.iter().any(|v| v.constant().is_none());
         let suffix = if by_default { ", with the defaults of its parameters" } else { "" };
         let Some((fault, severity)) = fault(&body.name, mass, entries, moments, raw.lenient, suffix) else { continue };

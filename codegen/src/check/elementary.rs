@@ -1,6 +1,6 @@
 //! The one table of the pairs of shapes that can touch.
 
-use super::merged::{apply, matrix};
+use crate::inertia::{apply, matrix};
 use crate::model::{LoopKind, Mount, Placement, ShapeKind, Value};
 
 /// What [`elementary`] has, for messages.

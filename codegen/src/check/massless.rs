@@ -1,9 +1,9 @@
 //! Freedoms that nothing resists: they make the mass matrix singular.
 
-use super::merged::{apply, at_default, cross, dot, moved, own, sum, trace, transpose, unit, Inertia, Mat3};
 use crate::import::raw::RawModel;
 use crate::import::source::Findings;
 use crate::import::words::quote;
+use crate::inertia::{apply, at_default, cross, dot, moved, own, sum, trace, transpose, unit, Inertia, Mat3};
 use crate::model::{Body, Freedom, JointKind, JointMotion, Model, Param, Unit, Value};
 
 /// Below this fraction of the body's largest moment (or of its mass) an inertia is taken for rounding: 1.5708 for pi/2

@@ -1,61 +1,7 @@
 //! Inertias of what fixed joints connect.
 
-use mbd_runtime::Scalar;
-
-use super::symmetric::full;
-use crate::model::{Body, Joint, Param, Placement, Rotation, Value};
-use crate::rounded_once::norm;
-
-pub(super) type Mat3 = [[f64; 3]; 3];
-
-/// Mass, first moment and inertia about the origin, in the axes of one frame.
-#[derive(Clone, Copy, Default)]
-pub(super) struct Inertia {
-    /// kg.
-    pub mass: f64,
-    /// Mass times centre of mass, kg m.
-    pub first: [f64; 3],
-    /// kg m².
-    pub about_origin: Mat3,
-}
-
-/// A number at the defaults of the parameters.
-pub(super) fn at_default(value: Value, params: &[Param]) -> f64 {
-    match value {
-        Value::Const(x) => x,
-        Value::Param(k) => params[k].default,
-    }
-}
-
-/// Inertia of a body in its own frame.
-pub(super) fn own(body: &Body, params: &[Param]) -> Inertia {
-    let at = |x: Value| at_default(x, params);
-    let (mass, com) = (at(body.mass), body.com.map(at));
-    let r = matrix(&body.inertia_axes, &at);
-    let about_com = multiply(&multiply(&r, &full(body.inertia.map(at))), &transpose(&r));
-    Inertia { mass, first: com.map(|x| mass * x), about_origin: add(about_com, steiner(mass, com, com)) }
-}
-
-/// The inertia seen from the parent frame, at zero coordinates (used for fixed joints only).
-pub(super) fn moved(i: Inertia, placement: &Placement, params: &[Param]) -> Inertia {
-    let r = matrix(&placement.rotation, &|x| at_default(x, params));
-    let d = placement.xyz.map(|x| at_default(x, params));
-    let first = apply(&r, i.first);
-    let turned = multiply(&multiply(&r, &i.about_origin), &transpose(&r));
-    // About d + x: I + (d, h) + (h, d) + m (d, d).
-    let mixed = add(steiner(1.0, d, first), steiner(1.0, first, d));
-    let about_origin = add(add(turned, mixed), steiner(i.mass, d, d));
-    Inertia { mass: i.mass, first: [0, 1, 2].map(|k| first[k] + i.mass * d[k]), about_origin }
-}
-
-/// The inertia of two together.
-pub(super) fn sum(a: Inertia, b: Inertia) -> Inertia {
-    Inertia {
-        mass: a.mass + b.mass,
-        first: [0, 1, 2].map(|k| a.first[k] + b.first[k]),
-        about_origin: add(a.about_origin, b.about_origin),
-    }
-}
+use crate::inertia::{about_com, moved, own, sum, Inertia};
+use crate::model::{Body, Joint, Param};
 
 /// For each body the inertia about the centre of mass, `[xx, yy, zz, xy, xz, yz]`, of all that fixed joints connect it
 /// with, and the mass; `None` for what is fixed to the ground. Joints stand depth first; a body without one is alone.
@@ -72,68 +18,8 @@ pub(super) fn together(bodies: &[Body], joints: &[Joint], params: &[Param]) -> V
         }
     }
     let about_com = |i: Inertia| {
-        let com = i.first.map(|x| x / i.mass);
-        let shift = steiner(i.mass, com, com);
-        let entry = |a: usize, b: usize| i.about_origin[a][b] - shift[a][b];
-        (i.mass, [entry(0, 0), entry(1, 1), entry(2, 2), entry(0, 1), entry(0, 2), entry(1, 2)])
+        let (mass, _, entries) = about_com(i);
+        (mass, entries)
     };
     root.iter().map(|root| root.map(|root| about_com(total[root]))).collect()
-}
-
-/// The matrix of a rotation whose numbers have the values that `at` gives.
-pub(super) fn matrix(rotation: &Rotation, at: &dyn Fn(Value) -> f64) -> Mat3 {
-    let about = |axis: [f64; 3], angle: f64| {
-        let (s, c) = Scalar::sin_cos(angle);
-        let [x, y, z] = axis;
-        let skew = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
-        let one = |i: usize, j: usize| f64::from(u8::from(i == j));
-        [0, 1, 2].map(|i| [0, 1, 2].map(|j| c * one(i, j) + s * skew[i][j] + (1.0 - c) * axis[i] * axis[j]))
-    };
-    match rotation {
-        Rotation::AxisAngle { axis, angle } => about(unit(*axis), at(*angle)),
-        Rotation::Rpy(rpy) => {
-            let [roll, pitch, yaw] = rpy.map(at);
-            let zy = multiply(&about([0.0, 0.0, 1.0], yaw), &about([0.0, 1.0, 0.0], pitch));
-            multiply(&zy, &about([1.0, 0.0, 0.0], roll))
-        }
-    }
-}
-
-/// `m (a·b 1 - b aᵀ)`, symmetric in sum with its counterpart.
-fn steiner(m: f64, a: [f64; 3], b: [f64; 3]) -> Mat3 {
-    [0, 1, 2].map(|i| [0, 1, 2].map(|j| m * (if i == j { dot(a, b) } else { 0.0 } - b[i] * a[j])))
-}
-
-pub(super) fn unit(v: [f64; 3]) -> [f64; 3] {
-    let n = norm(v);
-    v.map(|x| x / n)
-}
-
-pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(super) fn apply(m: &Mat3, v: [f64; 3]) -> [f64; 3] {
-    m.map(|row| dot(row, v))
-}
-
-pub(super) fn transpose(m: &Mat3) -> Mat3 {
-    [0, 1, 2].map(|i| [0, 1, 2].map(|j| m[j][i]))
-}
-
-fn multiply(a: &Mat3, b: &Mat3) -> Mat3 {
-    let t = transpose(b);
-    a.map(|row| t.map(|column| dot(row, column)))
-}
-
-fn add(a: Mat3, b: Mat3) -> Mat3 {
-    [0, 1, 2].map(|i| [0, 1, 2].map(|j| a[i][j] + b[i][j]))
-}
-
-pub(super) fn trace(m: &Mat3) -> f64 {
-    m[0][0] + m[1][1] + m[2][2]
 }

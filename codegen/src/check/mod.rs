@@ -13,7 +13,6 @@ mod numbers;
 mod shapes;
 mod starts;
 mod stops;
-mod symmetric;
 mod tree;
 mod variants;
 

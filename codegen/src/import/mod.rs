@@ -1,10 +1,15 @@
 //! Readers of file formats: text to [`raw::RawModel`]. Nothing outside this module knows the formats.
 
+mod floor;
+pub mod mjcf;
 pub mod raw;
 pub mod source;
+mod taken;
+mod tally;
 pub mod toml;
 pub mod urdf;
 pub mod words;
+mod xml;
 
 use crate::choice::choice;
 
@@ -25,16 +30,50 @@ choice! {
 pub struct ImportOptions {
     /// Attachment of the root; for URDF only.
     pub base: Base,
-    /// Gravity in ground axes, m/s², instead of that of the file (URDF states none: `[0, 0, -9.81]`).
+    /// Gravity in ground axes, m/s², instead of that of the file (URDF states none: `[0, 0, -9.81]`, which is also the
+    /// default of MJCF).
     pub gravity: Option<[f64; 3]>,
-    /// Whether `limit`s are stops; for URDF only.
+    /// Whether joint limits are stops; for URDF and MJCF only.
     pub limits: bool,
-    /// A floor that the shapes of the robot can touch; for URDF only. Without one, they touch nothing.
+    /// A floor that the shapes of the robot can touch; for URDF and MJCF only. Without one, they touch nothing.
     pub floor: Option<Floor>,
 }
 
-/// How the file that a description names as its base is read.
-pub type ReadFile<'f> = &'f dyn Fn(&std::path::Path) -> std::io::Result<String>;
+/// The formats of XML files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum XmlFormat {
+    /// Robots of links and joints.
+    Urdf,
+    /// Models of MuJoCo.
+    Mjcf,
+}
+
+impl XmlFormat {
+    /// The format by the outermost element; `None` where it is another one.
+    pub fn of(text: &str) -> Option<XmlFormat> {
+        let mut rest = text.trim_start_matches('\u{feff}').trim_start();
+        // Declarations and comments may stand before it.
+        while let Some((start, end)) =
+            [("<?", "?>"), ("<!--", "-->"), ("<!", ">")].iter().find(|p| rest.starts_with(p.0))
+        {
+            rest = rest[start.len()..].split_once(end).map_or("", |(_, rest)| rest.trim_start());
+        }
+        match rest {
+            _ if rest.starts_with("<mujoco") => Some(XmlFormat::Mjcf),
+            _ if rest.starts_with("<robot") || text.contains("<robot") => Some(XmlFormat::Urdf),
+            _ => None,
+        }
+    }
+}
+
+/// How the files that a description names, as its base or to include them, are read.
+pub type ReadFile<'f> = &'f dyn Fn(&std::path::Path) -> std::io::Result<Vec<u8>>;
+
+/// The text of a file that a description names.
+fn text(files: ReadFile, path: &std::path::Path) -> std::io::Result<String> {
+    let wrong = |_| std::io::Error::new(std::io::ErrorKind::InvalidData, "it is not UTF-8 text");
+    String::from_utf8(files(path)?).map_err(wrong)
+}
 
 /// A floor across z of the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -22,6 +22,13 @@ pub enum RawValue {
 /// A number and its place.
 pub type RawNumber = Spanned<RawValue>;
 
+impl RawNumber {
+    /// A finite constant.
+    pub fn constant(x: f64, span: Span) -> RawNumber {
+        Spanned::new(RawValue::Const(x), span)
+    }
+}
+
 /// Three numbers and the place of the whole.
 pub type RawVec3 = Spanned<[RawNumber; 3]>;
 
@@ -37,6 +44,18 @@ pub enum RawRotation {
         /// Angle, rad.
         angle: RawNumber,
     },
+}
+
+impl RawRotation {
+    /// Axis and angle, where the rotation is given by them and they are constants.
+    pub fn constant(&self) -> Option<([f64; 3], f64)> {
+        match self {
+            RawRotation::AxisAngle { axis: Some(axis), angle: Spanned { value: RawValue::Const(angle), .. } } => {
+                Some((axis.value, *angle))
+            }
+            _ => None,
+        }
+    }
 }
 
 /// A pose; `None` stands for zero.
@@ -353,6 +372,13 @@ pub enum RawGravity {
     Constant(RawVec3),
     /// Given with every call.
     Input,
+}
+
+impl RawGravity {
+    /// Gravity of the import options, m/s² in ground axes.
+    pub fn of_options(g: [f64; 3]) -> RawGravity {
+        RawGravity::Constant(Spanned::new(g.map(|x| RawNumber::constant(x, Span::FILE)), Span::FILE))
+    }
 }
 
 /// A model as changes of another one.

@@ -1,6 +1,7 @@
 //! Places in a source text and the collector of findings that every reader and the checks write to.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::diag::{Diagnostic, Diagnostics, Severity};
@@ -81,7 +82,7 @@ impl<'a> SourceMap<'a> {
     }
 }
 
-/// Collects the findings about one file.
+/// Collects the findings about one file, and about the files that it names.
 #[derive(Clone, Debug)]
 pub struct Findings<'a> {
     file: Arc<str>,
@@ -89,29 +90,67 @@ pub struct Findings<'a> {
     list: Vec<Diagnostic>,
     /// Warnings about what nothing uses, unless a variant does.
     unused: Vec<Diagnostic>,
-    /// The file that this one changes, if it does.
-    base: Option<Arc<BaseSource>>,
+    /// Where the offsets of spans lead, in rising order; before the first piece they are those of the file.
+    pieces: Vec<Piece>,
 }
 
-/// A second source, whose places begin where those of the first end.
-#[derive(Debug)]
-struct BaseSource {
-    file: Arc<str>,
+/// A part of what was read that stands in another file, or further on in the same one: from this offset on.
+#[derive(Clone, Debug)]
+struct Piece {
     start: usize,
+    /// Offset in the source.
+    at: usize,
+    /// The source; `None` for the first file.
+    source: Option<Arc<Source>>,
+}
+
+/// A file that another one names.
+#[derive(Debug)]
+pub struct Source {
+    file: Arc<str>,
     map: SourceMap<'static>,
+}
+
+impl Source {
+    /// A file by its name in messages, and its text.
+    pub fn new(file: &str, text: String) -> Arc<Source> {
+        Arc::new(Source { file: file.into(), map: SourceMap::new(text) })
+    }
 }
 
 impl<'a> Findings<'a> {
     /// A collector without findings; `file` is the name that the caller gave.
     pub fn new(file: &str, text: &'a str) -> Self {
-        Findings { file: file.into(), map: SourceMap::new(text), list: Vec::new(), unused: Vec::new(), base: None }
+        Findings {
+            file: file.into(),
+            map: SourceMap::new(text),
+            list: Vec::new(),
+            unused: Vec::new(),
+            pieces: Vec::new(),
+        }
     }
 
     /// Adds the file that this one changes: its places are those of `text` from the offset that is returned.
     pub fn add_base(&mut self, file: &str, text: String) -> usize {
         let start = self.map.text.len() + 1;
-        self.base = Some(Arc::new(BaseSource { file: file.into(), start, map: SourceMap::new(text) }));
+        self.pieces.push(Piece { start, at: 0, source: Some(Source::new(file, text)) });
         start
+    }
+
+    /// The source of an offset and the offset there.
+    pub fn source_at(&self, offset: usize) -> (Option<Arc<Source>>, usize) {
+        let before = self.pieces.partition_point(|piece| piece.start <= offset);
+        match before.checked_sub(1).map(|k| &self.pieces[k]) {
+            Some(piece) => (piece.source.clone(), piece.at + (offset - piece.start)),
+            None => (None, offset),
+        }
+    }
+
+    /// From the offset `start` on, all offsets are those of `source` from `at` on. Pieces are added in rising order;
+    /// those that began further on are dropped.
+    pub fn continue_with(&mut self, start: usize, (source, at): (Option<Arc<Source>>, usize)) {
+        self.pieces.retain(|piece| piece.start < start);
+        self.pieces.push(Piece { start, at, source });
     }
 
     /// A collector without findings about the same file.
@@ -171,12 +210,14 @@ impl<'a> Findings<'a> {
 
     /// Place of the start of a span.
     pub fn origin(&self, span: Span) -> Origin {
-        if let Some(base) = self.base.as_ref().filter(|base| span.start >= base.start) {
-            let (line, column) = base.map.position(span.start - base.start);
-            return Origin { file: base.file.clone(), line, column };
+        if span == Span::FILE {
+            return Origin { file: self.file.clone(), line: 0, column: 0 };
         }
-        let (line, column) = if span == Span::FILE { (0, 0) } else { self.map.position(span.start) };
-        Origin { file: self.file.clone(), line, column }
+        let (file, (line, column)) = match self.source_at(span.start) {
+            (Some(source), at) => (source.file.clone(), source.map.position(at)),
+            (None, at) => (self.file.clone(), self.map.position(at)),
+        };
+        Origin { file, line, column }
     }
 
     /// Whether there is an error among them.
@@ -184,11 +225,21 @@ impl<'a> Findings<'a> {
         self.list.iter().any(|d| d.severity == Severity::Error)
     }
 
-    /// All findings, in the order of the file; behind them those about the file that it changes.
+    /// All findings, in the order of the file; behind them those about the files that it names.
     pub fn finish(mut self) -> Diagnostics {
         self.list.append(&mut self.unused);
         let file = &self.file;
-        self.list.sort_by_key(|d| (*d.file != **file, d.line, d.column));
+        let named = |d: &Diagnostic| {
+            self.pieces.iter().position(|piece| piece.source.as_ref().is_some_and(|source| *source.file == *d.file))
+        };
+        // Many findings are about few files.
+        let mut rank: HashMap<String, usize> = HashMap::new();
+        for d in self.list.iter().filter(|d| *d.file != **file) {
+            if !rank.contains_key(&d.file) {
+                rank.insert(d.file.clone(), named(d).map_or(0, |k| k + 1));
+            }
+        }
+        self.list.sort_by_key(|d| (rank.get(&d.file).copied().unwrap_or(0), d.line, d.column));
         Diagnostics(self.list)
     }
 }

@@ -14,7 +14,7 @@ pub use constraint::{
 };
 pub use contact::{Contact, Shape, ShapeKind, ShapeSpec, SHAPES};
 pub use joint::{Coordinate, Freedom, Joint, JointBounds, JointKind, JointMotion, JointSpec, JOINTS};
-pub(crate) use joint::{FIXED, FLOATING, PLANAR, REVOLUTE};
+pub(crate) use joint::{FIXED, FLOATING, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL};
 
 /// Place of a part of the description in its file. It is ignored in comparisons: two models are equal if they describe
 /// the same mechanism.

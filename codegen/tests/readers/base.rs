@@ -15,11 +15,11 @@ const ROBOT: &str = "<?xml version=\"1.0\"?>\n<robot name='arm'>\n<link name='ba
 /// Reads a text in the folder `robots`, where there are `arm.urdf` and `whole.toml`.
 fn read(text: &str) -> (Option<Model>, String, Vec<Severity>) {
     let files = |path: &Path| match path.to_string_lossy().replace('\\', "/").as_str() {
-        "robots/arm.urdf" => Ok(ROBOT.to_string()),
+        "robots/arm.urdf" => Ok(ROBOT.as_bytes().to_vec()),
         "robots/broken.urdf" => {
-            Ok(ROBOT.replace("'0.02' ixy", "'-0.02' ixy").replace("mass value='2'", "mass value='x'"))
+            Ok(ROBOT.replace("'0.02' ixy", "'-0.02' ixy").replace("mass value='2'", "mass value='x'").into_bytes())
         }
-        "robots/nested.toml" => Ok("[base]\nfile = 'arm.urdf'\n".to_string()),
+        "robots/nested.toml" => Ok(b"[base]\nfile = 'arm.urdf'\n".to_vec()),
         _ => Err(Error::new(ErrorKind::NotFound, "no such file")),
     };
     let (read, findings) = load_with("robots/changed.toml", text, &ImportOptions::default(), &files);
@@ -79,7 +79,7 @@ fn findings_name_the_file_they_are_about() {
 
 #[test]
 fn a_changed_robot_is_converted_whole() {
-    let files = |_: &Path| Ok(ROBOT.to_string());
+    let files = |_: &Path| Ok(ROBOT.as_bytes().to_vec());
     let text = "[base]\nfile = 'arm.urdf'\n[[joint]]\nname = 'shoulder'\narmature = 0.1\n";
     let (toml, _) = to_toml("changed.toml", text, &ImportOptions::default(), &files).expect("a sound model");
     assert!(toml.contains("armature = 0.1") && !toml.contains("[base]"), "{toml}");

@@ -55,3 +55,8 @@ fn toml() {
 fn urdf() {
     run("urdf", "urdf", 20);
 }
+
+#[test]
+fn mjcf() {
+    run("mjcf", "xml", 10);
+}

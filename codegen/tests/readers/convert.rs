@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use mbd_codegen::read::{load_all, to_toml, Base, ImportOptions};
 
 /// No file is there.
-fn none(path: &Path) -> std::io::Result<String> {
+fn none(path: &Path) -> std::io::Result<Vec<u8>> {
     Err(std::io::Error::new(std::io::ErrorKind::NotFound, path.display().to_string()))
 }
 
@@ -15,7 +15,7 @@ fn files(folder: &Path, all: &mut Vec<PathBuf>) {
         let path = entry.expect("an entry").path();
         match path.extension().and_then(|e| e.to_str()) {
             _ if path.is_dir() => files(&path, all),
-            Some("toml" | "urdf") => all.push(path),
+            Some("toml" | "urdf" | "xml") => all.push(path),
             _ => {}
         }
     }
@@ -26,7 +26,7 @@ fn converted(path: &Path, options: &ImportOptions) {
     let (file, text) = (path.to_string_lossy(), std::fs::read_to_string(path).expect("a model"));
     let (model, _) = load_all(&file, &text, options);
     // A base is there, and is in what was converted.
-    let (toml, _) = to_toml(&file, &text, options, &|path| std::fs::read_to_string(path))
+    let (toml, _) = to_toml(&file, &text, options, &|path| std::fs::read(path))
         .unwrap_or_else(|findings| panic!("{file}: {findings}"));
     let (again, findings) = load_all("again.toml", &toml, &ImportOptions::default());
     assert!(again.is_some() && again == model, "{file}: {findings}");
@@ -46,6 +46,15 @@ fn every_model_converts_to_itself() {
     // These are there to be refused.
     all.retain(|path| !path.ends_with("point_on_axis.toml") && !path.ends_with("massless_tip.toml"));
     assert!(all.len() > 40, "{} models", all.len());
+    // Some of MuJoCo's are refused, and some are parts of others.
+    let mut of_mujoco = Vec::new();
+    files(&root.join("../tests/reference/mjcf"), &mut of_mujoco);
+    of_mujoco.retain(|path| {
+        let text = std::fs::read_to_string(path).expect("a model");
+        load_all(&path.to_string_lossy(), &text, &ImportOptions::default()).0.is_some()
+    });
+    assert!(of_mujoco.len() > 36, "{} models of MuJoCo", of_mujoco.len());
+    all.extend(of_mujoco);
     for path in &all {
         converted(path, &ImportOptions::default());
         if path.extension().is_some_and(|e| e == "urdf") {

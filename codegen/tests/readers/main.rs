@@ -1,9 +1,10 @@
-//! The readers of TOML and URDF: the models of valid files, and the findings about others.
+//! The readers of TOML, URDF and MJCF: the models of valid files, and the findings about others.
 
 mod base;
 mod broken;
 mod convert;
 mod large;
+mod mjcf;
 mod mutate;
 mod mutation;
 mod toml_constraints;

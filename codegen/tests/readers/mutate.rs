@@ -6,7 +6,7 @@ use std::path::Path;
 /// Pseudo-random changes; the same seed gives the same changes.
 pub struct Mutator(u64);
 
-/// Pieces of both formats that are inserted anywhere.
+/// Pieces of all formats that are inserted anywhere.
 const TOKENS: &[&str] = &[
     "[[body]]",
     "[[joint]]",
@@ -67,6 +67,19 @@ const TOKENS: &[&str] = &[
     "type=\"fixed\"",
     "type=\"floating\"",
     "<![CDATA[",
+    "<body name=\"a\">",
+    "</body>",
+    "<geom size=\"0.1\"/>",
+    "<geom type=\"mesh\"/>",
+    "<freejoint/>",
+    "<joint type=\"ball\"/>",
+    "<default class=\"a\">",
+    "class=\"a\"",
+    "<include file=\"a\"/>",
+    "<frame euler=\"1 2 3\">",
+    "<weld body1=\"a\"/>",
+    "<worldbody>",
+    "</mujoco>",
     "<!DOCTYPE a [<!ENTITY b \"b\">]>",
     "&b;",
 ];

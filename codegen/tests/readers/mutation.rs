@@ -40,3 +40,8 @@ fn mutated_toml_never_panics() {
 fn mutated_urdf_never_panics() {
     survive("m.urdf", &seeds("urdf"), 20_000);
 }
+
+#[test]
+fn mutated_mjcf_never_panics() {
+    survive("m.xml", &seeds("xml"), 20_000);
+}

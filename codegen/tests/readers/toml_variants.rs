@@ -77,12 +77,7 @@ fn a_file_gives_a_variant() {
     assert_eq!(Model::load_variant(path, "held").expect("a model").name, "gripper_held");
     let error = Model::load_variant(path, "hold").expect_err("no variant").to_string();
     assert!(error.contains("no variant `hold`") && error.contains("did you mean `held`?"), "{error}");
-    let (model, findings) = read::load_variant(
-        "m.toml",
-        ALL,
-        &ImportOptions::default(),
-        &|path| std::fs::read_to_string(path),
-        Some("xyz"),
-    );
+    let (model, findings) =
+        read::load_variant("m.toml", ALL, &ImportOptions::default(), &|path| std::fs::read(path), Some("xyz"));
     assert!(model.is_none() && findings.to_string().contains("the variants are `dropped`"), "{findings}");
 }

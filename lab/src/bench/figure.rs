@@ -1,9 +1,9 @@
 //! Figures with logarithmic axes.
 
-use plotters::coord::Shift;
-use plotters::prelude::*;
+use std::fmt::Write as _;
 
-use mbd_cli::plot::{colour, shrunk, SCALE};
+use mbd_cli::ink::{self, escaped, shortened};
+use mbd_cli::plot::{class, Axis, Chart};
 
 /// One line: points `(x, y)`, both positive.
 pub struct Line {
@@ -27,99 +27,68 @@ pub struct Figure {
     pub lines: [Vec<Line>; 2],
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
-
-const WIDTH: u32 = 1180 * SCALE;
-const HEIGHT: u32 = 440 * SCALE;
-const LEGEND: u32 = 230 * SCALE;
-const TITLE: u32 = 32 * SCALE;
+const SIZE: [f64; 2] = [1180.0, 448.0];
+/// Room for the legend, for the numbers of an axis, and at the edges, pixels.
+const LEGEND: f64 = 250.0;
+const NUMBERS: f64 = 48.0;
+const EDGE: f64 = 16.0;
+/// Top of the charts, and their height, pixels.
+const TOP: f64 = 72.0;
+const HEIGHT: f64 = 316.0;
 
 impl Figure {
     /// The figure as SVG.
-    pub fn svg(&self) -> Result<String, String> {
-        let mut text = String::new();
-        {
-            let root = SVGBackend::with_string(&mut text, (WIDTH, HEIGHT)).into_drawing_area();
-            self.draw(&root).and_then(|()| root.present()).map_err(|e| e.to_string())?;
+    pub fn svg(&self) -> String {
+        let mut text = ink::head(SIZE, &self.title);
+        let title = escaped(&self.title);
+        let _ = writeln!(text, "<text class=\"head\" style=\"font-size:16px\" x=\"{EDGE}\" y=\"28\">{title}</text>");
+        let width = 0.5 * (SIZE[0] - LEGEND);
+        for (k, lines) in self.lines.iter().enumerate() {
+            chart(&mut text, EDGE + k as f64 * width, width, (&self.x[k], &self.y[k]), lines);
         }
-        Ok(shrunk(&text))
-    }
-
-    fn draw(&self, root: &Area) -> Drawn {
-        root.fill(&WHITE)?;
-        let style = ("sans-serif", 17 * SCALE).into_font().color(&BLACK);
-        root.draw(&Text::new(self.title.clone(), (16 * SCALE as i32, 10 * SCALE as i32), style))?;
-        let (charts, legend) = root.split_vertically(TITLE).1.split_horizontally(WIDTH - LEGEND);
-        let (left, right) = charts.split_horizontally((WIDTH - LEGEND) / 2);
-        for (k, area) in [left, right].iter().enumerate() {
-            chart(area, &self.x[k], &self.y[k], &self.lines[k])?;
-        }
-        let style = ("sans-serif", 11 * SCALE).into_font().color(&BLACK);
-        let unit = SCALE as i32;
         for (k, line) in self.lines[0].iter().enumerate() {
-            let y = 24 * unit + (k as i32) * 16 * unit;
-            let stroke = colour(k).stroke_width(2 * SCALE);
-            if line.thin {
-                for from in [4, 15] {
-                    legend.draw(&PathElement::new([(from * unit, y), ((from + 8) * unit, y)], stroke))?;
-                }
-            } else {
-                legend.draw(&PathElement::new([(4 * unit, y), (26 * unit, y)], stroke))?;
-                legend.draw(&Circle::new((15 * unit, y), 3 * unit, colour(k).filled()))?;
+            let (x, y) = (SIZE[0] - LEGEND + 8.0, TOP + 8.0 + 16.0 * k as f64);
+            let _ = writeln!(text, "<path class=\"curve {}\" d=\"M{x:.1} {y:.1}h28\"/>", stroke(k, line));
+            if !line.thin {
+                let _ = writeln!(text, "<circle class=\"{}\" cx=\"{:.1}\" cy=\"{y:.1}\" r=\"3\"/>", fill(k), x + 14.0);
             }
-            legend.draw(&Text::new(line.name.clone(), (32 * unit, y - 6 * unit), style.clone()))?;
+            let short = escaped(&shortened(&line.name, 11.0, LEGEND - 48.0));
+            let _ = writeln!(text, "<text class=\"small\" x=\"{:.1}\" y=\"{:.1}\">{short}</text>", x + 34.0, y + 4.0);
         }
-        Ok(())
+        text + "</svg>\n"
     }
 }
 
-/// The range of all values, extended to whole powers of ten.
-fn range(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
-    let logs = values.filter(|x| *x > 0.0 && x.is_finite()).map(f64::log10);
-    let (low, high) = logs.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
-    match low <= high {
-        true => 10.0_f64.powf(low.floor())..10.0_f64.powf((high + 1e-9).ceil().max(low.floor() + 1.0)),
-        false => 0.1..1.0,
-    }
+/// Class of a line: those for comparison are dashed.
+fn stroke(k: usize, line: &Line) -> String {
+    class(k, usize::from(line.thin))
 }
 
-fn chart(area: &Area, x: &str, y: &str, lines: &[Line]) -> Drawn {
+/// Class of the marks of a line.
+fn fill(k: usize) -> String {
+    format!("k{}", k % ink::COLOURS)
+}
+
+fn chart(text: &mut String, left: f64, width: f64, (x, y): (&str, &str), lines: &[Line]) {
     let all = || lines.iter().flat_map(|l| &l.points);
-    let (xs, ys) = (range(all().map(|p| p.0)), range(all().map(|p| p.1)));
-    let mut chart = ChartBuilder::on(area)
-        .margin(8 * SCALE)
-        .x_label_area_size(38 * SCALE)
-        .y_label_area_size(66 * SCALE)
-        .build_cartesian_2d(xs.log_scale(), ys.log_scale())?;
-    let power = |v: &f64| match v.log10().round() {
-        0.0 => "1".to_string(),
-        power => format!("1e{power}"),
+    let chart = Chart {
+        corner: [left + NUMBERS, TOP],
+        size: [width - NUMBERS - EDGE, HEIGHT],
+        x: Axis::logarithmic(all().map(|p| p.0), 9.0),
+        y: Axis::logarithmic(all().map(|p| p.1), 9.0),
     };
-    chart
-        .configure_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(RGBColor(224, 224, 224).stroke_width(SCALE))
-        .axis_style(RGBColor(90, 90, 90).stroke_width(SCALE))
-        .x_desc(x)
-        .y_desc(y)
-        .x_labels(9)
-        .y_labels(9)
-        .x_label_formatter(&power)
-        .y_label_formatter(&power)
-        .label_style(("sans-serif", 11 * SCALE))
-        .axis_desc_style(("sans-serif", 13 * SCALE))
-        .draw()?;
+    chart.frame(text, [true, true]);
+    let _ = writeln!(text, "<text class=\"small m\" x=\"{left:.1}\" y=\"{:.1}\">{}</text>", TOP - 12.0, escaped(y));
+    let (middle, bottom) = (chart.corner[0] + 0.5 * chart.size[0], TOP + HEIGHT + 34.0);
+    let _ = writeln!(text, "<text class=\"small m mid\" x=\"{middle:.1}\" y=\"{bottom:.1}\">{}</text>", escaped(x));
     for (k, line) in lines.iter().enumerate() {
-        let points = line.points.iter().copied();
-        if line.thin {
-            let style = colour(k).stroke_width(2 * SCALE);
-            chart.draw_series(DashedLineSeries::new(points, 6 * SCALE, 4 * SCALE, style))?;
-        } else {
-            chart.draw_series(LineSeries::new(points, colour(k).stroke_width(2 * SCALE)))?;
-            let mark = |p: &(f64, f64)| Circle::new(*p, 3 * SCALE, colour(k).filled());
-            chart.draw_series(line.points.iter().map(mark))?;
+        let (xs, ys): (Vec<f64>, Vec<f64>) = line.points.iter().copied().unzip();
+        chart.curve(text, (&xs, &ys), &stroke(k, line), &line.name);
+        for (x, y) in line.points.iter().filter(|_| !line.thin) {
+            let [x, y] = chart.place(*x, *y);
+            if x.is_finite() && y.is_finite() {
+                let _ = writeln!(text, "<circle class=\"{}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"2.6\"/>", fill(k));
+            }
         }
     }
-    Ok(())
 }

@@ -122,7 +122,7 @@ fn work_precision(args: &WorkArgs, out: &mut dyn Write) -> Outcome {
 /// The figure of a scene, if it has samples.
 fn write_figure(measured: &Measured, directory: &Path) -> Outcome {
     let Some(figure) = tables::figure(measured) else { return Ok(()) };
-    let svg = figure.svg().map_err(|e| Failure::new(format!("cannot draw: {e}"), "look at the table"))?;
+    let svg = figure.svg();
     std::fs::create_dir_all(directory)
         .map_err(|e| Failure::new(format!("cannot make `{}`: {e}", directory.display()), "name another directory"))?;
     write_file(&directory.join(format!("{}.svg", measured.scene.name)), &svg)

@@ -74,14 +74,14 @@ fn steps_panel(runs: &[Adaptive; 2]) -> Panel {
     let counts = |run: &Adaptive| run.tried.iter().map(|&n| n as f64).collect();
     let t = (1..=runs[0].tried.len()).map(|k| k as f64).collect();
     let names = ["accelerations", "Hamilton"].map(String::from);
-    Panel { label: "steps tried".into(), t, lines: names.into_iter().zip(runs.iter().map(counts)).collect() }
+    Panel::new("steps tried", t, names.into_iter().zip(runs.iter().map(counts)).collect())
 }
 
 /// One panel of lines with names.
 fn panel(label: &str, names: &[&str], traces: &[&Traces]) -> Panel {
     let lines = traces.iter().flat_map(|t| &t.lines).cloned();
     let lines = names.iter().map(|n| n.to_string()).zip(lines).collect();
-    Panel { label: label.into(), t: traces.first().map_or(Vec::new(), |t| t.t.clone()), lines }
+    Panel::new(label, traces.first().map_or(Vec::new(), |t| t.t.clone()), lines)
 }
 
 /// Figures 7.9 to 7.13, and their ranges as numbers.

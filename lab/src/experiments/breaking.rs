@@ -14,6 +14,7 @@ use super::tables::{head, row};
 use super::{directory, figure, thesis};
 use crate::args::experiments::BreakingArgs;
 use crate::scenes::breaking::{Breaking, Part, State, BREAK, END, LENGTH, LINK, LINKS, STEP};
+use mbd_cli::ink;
 use mbd_cli::plot::Panel;
 use mbd_cli::{note, write_file, Failure, Outcome};
 
@@ -127,24 +128,21 @@ fn motion(chain: &Breaking, args: &BreakingArgs, out: &mut dyn Write) -> Outcome
     write_file(&path, &picture(&shapes))?;
     writeln!(out, "figure: {}", path.display())?;
     let line = |name: &str, value: &dyn Fn(&Moment) -> f64| (name.to_string(), moments.iter().map(value).collect());
-    let energies = Panel {
-        label: "energy [J]".into(),
-        t: moments.iter().map(|m| m.t).collect(),
-        lines: vec![
+    let energies = Panel::new(
+        "energy [J]",
+        moments.iter().map(|m| m.t).collect(),
+        vec![
             line("links 1 to 40", &|m| m.parts[0].total()),
             line("links 41 to 100", &|m| m.parts[1].total()),
             line("taken by friction", &|m| m.friction),
             line("sum", &Moment::sum),
         ],
-    };
-    let kinetic = Panel {
-        label: "kinetic energy [J]".into(),
-        t: energies.t.clone(),
-        lines: vec![
-            line("links 1 to 40", &|m| m.parts[0].energy[0]),
-            line("links 41 to 100", &|m| m.parts[1].energy[0]),
-        ],
-    };
+    );
+    let kinetic = Panel::new(
+        "kinetic energy [J]",
+        energies.t.clone(),
+        vec![line("links 1 to 40", &|m| m.parts[0].energy[0]), line("links 41 to 100", &|m| m.parts[1].energy[0])],
+    );
     figure(out, folder, "breaking_energy", "Energy of a breaking chain", "time [s]", &[energies, kinetic])
 }
 
@@ -314,17 +312,14 @@ fn picture(shapes: &[Shape]) -> String {
     }
     let place = |[x, y]: [f64; 2]| [EDGE + SCALE * (x - low[0]), EDGE + SCALE * (high[1] - y)];
     let [width, height] = place([high[0], low[1]]).map(|x| x + EDGE);
-    let mut text = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
-         viewBox=\"0 0 {width:.0} {height:.0}\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
-    );
+    let mut text = ink::head([width, height], "The chain at equal times; the free part has another colour");
     for (k, shape) in shapes.iter().enumerate() {
-        let light = 80.0 - 50.0 * k as f64 / shapes.len().max(1) as f64;
-        for (line, hue) in shape.lines.iter().zip([220, 10]) {
+        let opacity = 0.3 + 0.7 * (k + 1) as f64 / shapes.len() as f64;
+        for (line, class) in shape.lines.iter().zip(["c0", "c5"]) {
             let points: Vec<String> = line.iter().map(|p| place(*p)).map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
             let _ = writeln!(
                 text,
-                "<polyline points=\"{}\" fill=\"none\" stroke=\"hsl({hue}, 70%, {light:.0}%)\" stroke-width=\"1.5\"/>",
+                "<polyline points=\"{}\" class=\"curve {class}\" stroke-opacity=\"{opacity:.2}\"/>",
                 points.join(" ")
             );
         }

@@ -40,8 +40,7 @@ fn directory(path: Option<&Path>) -> Outcome {
 
 /// Draws a figure and prints its path.
 fn figure(out: &mut dyn Write, directory: &Path, name: &str, title: &str, x: &str, panels: &[Panel]) -> Outcome {
-    let picture = plot::svg_over(title, x, panels)
-        .map_err(|e| Failure::new(format!("cannot draw `{name}`: {e}"), "look at the tables"))?;
+    let picture = plot::svg_over(title, x, panels);
     let path = directory.join(format!("{name}.svg"));
     write_file(&path, &picture)?;
     writeln!(out, "figure: {}", path.display())?;

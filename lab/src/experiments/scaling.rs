@@ -199,7 +199,7 @@ fn figures(all: &[Measured], path: &std::path::Path, out: &mut dyn Write) -> Out
             let at = |n: &f64| of(all, family).find(|m| m.n as f64 == *n).map_or(f64::NAN, value);
             (family.to_string(), t.iter().map(at).collect())
         };
-        let panel = Panel { label: label.into(), lines: FAMILIES.map(line).into(), t: t.clone() };
+        let panel = Panel::new(label, t.clone(), FAMILIES.map(line).into());
         figure(out, path, name, title, "number of links", &[panel])
     };
     let title = "Time in the equations for a second of motion, interpreter";
@@ -330,6 +330,6 @@ fn many_loops(args: &ScalingArgs, effort: &Effort, out: &mut dyn Write) -> Outco
     let Some(path) = &args.out else { return Ok(()) };
     let t = rows.iter().map(|r| r.0 as f64).collect();
     let line = |k: usize| (names[k].to_string(), rows.iter().map(|r| 1e6 * r.1[k]).collect());
-    let panel = Panel { label: "µs".into(), t, lines: [line(0), line(1)].into() };
+    let panel = Panel::new("µs", t, [line(0), line(1)].into());
     figure(out, path, "loops", "Time of an evaluation, interpreter", "number of four-bars", &[panel])
 }

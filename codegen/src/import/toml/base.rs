@@ -7,7 +7,7 @@ use super::table::Table;
 use crate::import::raw::{RawBody, RawJoint, RawModel, RawMotion};
 use crate::import::source::{Findings, Span};
 use crate::import::words::quote;
-use crate::import::{urdf, Base, ImportOptions, ReadFile};
+use crate::import::{mjcf, text, urdf, Base, ImportOptions, ReadFile, XmlFormat};
 
 pub(super) const KEYS: &[&str] = &["file", "root", "limits"];
 
@@ -41,7 +41,7 @@ pub(super) fn read(
     let limits = table.flag("limits", findings).is_some_and(|flag| flag.value);
     let name = table.required_text("file", findings)?;
     let path = Path::new(findings.file()).parent().unwrap_or(Path::new("")).join(&name.value);
-    let text = match files(&path) {
+    let text = match text(files, &path) {
         Ok(text) => text,
         Err(error) => {
             let help = "the path is relative to the folder of this file";
@@ -58,13 +58,17 @@ pub(super) fn read(
         format!("{}{}", " ".repeat(start), without_start(text))
     };
     match extension.as_deref() {
+        Some("mjcf") => mjcf::read(&placed(&text, findings), &options, findings, files),
+        Some("xml") if XmlFormat::of(&text) == Some(XmlFormat::Mjcf) => {
+            mjcf::read(&placed(&text, findings), &options, findings, files)
+        }
         Some("urdf" | "xml") => urdf::read(&placed(&text, findings), &options, findings),
         Some("toml") => {
             super::refuse_options(&options, findings);
             super::document(&placed(&text, findings), &options, findings, None)
         }
         _ => {
-            let help = "name a `.urdf` or `.toml` file";
+            let help = "name a `.urdf`, `.xml` or `.toml` file";
             findings.error(name.span, format!("cannot read the base {}", quote(&name.value)), help);
             None
         }

@@ -17,7 +17,7 @@ use self::base::Known;
 pub use self::schema::schema;
 use self::table::Table;
 pub use self::write::write;
-use super::raw::{RawGravity, RawJoint, RawModel, RawParam, RawValue};
+use super::raw::{RawGravity, RawJoint, RawModel, RawParam};
 use super::source::{Findings, Span, Spanned};
 use super::words::quote;
 use super::{Base, ImportOptions, ReadFile};
@@ -53,7 +53,7 @@ fn override_gravity(g: [f64; 3], findings: &mut Findings) -> RawGravity {
     if g.iter().any(|x| !x.is_finite()) {
         findings.error(Span::FILE, "the option for gravity is not finite", "give three finite numbers in m/s²");
     }
-    RawGravity::Constant(Spanned::new(g.map(|x| Spanned::new(RawValue::Const(x), Span::FILE)), Span::FILE))
+    RawGravity::of_options(g)
 }
 
 /// Reads a text, and with `files` the one that it names as its base.

@@ -1,11 +1,11 @@
 //! `joint`: connects a link to its parent.
 
 use super::link::read_origin;
-use super::xml::{place, Reader};
 use crate::diag::Severity;
 use crate::import::raw::{RawFreedoms, RawJoint, RawLimits, RawMimic, RawNumber, RawValue};
 use crate::import::source::{Span, Spanned};
 use crate::import::words::{did_you_mean, quote};
+use crate::import::xml::{place, Reader};
 use crate::model::{JointSpec, JOINTS};
 use roxmltree::Node;
 

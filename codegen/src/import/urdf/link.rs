@@ -1,9 +1,9 @@
 //! `link`: a body and its inertia.
 
-use super::xml::{place, Reader};
 use crate::import::raw::{RawBody, RawNumber, RawPlacement, RawRotation, RawValue, RawVec3};
 use crate::import::source::{Span, Spanned};
 use crate::import::words::quote;
+use crate::import::xml::{place, Reader};
 use roxmltree::Node;
 
 /// Message for elements that only concern appearance.

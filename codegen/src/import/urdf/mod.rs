@@ -8,21 +8,20 @@
 mod joint;
 mod link;
 mod shape;
-mod unused;
-mod xml;
 
 #[cfg(test)]
 mod tests;
 
-use super::raw::{RawBody, RawGravity, RawJoint, RawModel, RawNumber, RawPlacement, RawShape, RawValue};
-use super::source::{Findings, Span, Spanned};
+use super::raw::{RawBody, RawGravity, RawJoint, RawModel};
+use super::source::{Findings, Spanned};
+use super::taken::Taken;
+use super::tally::Tally;
 use super::words::{list, quote};
-use super::{Base, Floor, ImportOptions};
-use crate::model::{FIXED, FLOATING, PLANAR, SHAPES};
+use super::xml::{place, shown, syntax_error, without_late_declaration, Reader};
+use super::{floor, Base, ImportOptions};
+use crate::model::{FIXED, FLOATING, PLANAR};
 use roxmltree::{Document, Node};
 use std::collections::HashSet;
-use unused::Tally;
-use xml::{place, shown, syntax_error, without_late_declaration, Reader};
 
 /// Elements of a `robot` that have no effect on its motion.
 const IGNORED: [(&str, &str); 6] = [
@@ -44,7 +43,7 @@ pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings) -> Opt
     let document = match Document::parse(text) {
         Ok(document) => document,
         Err(error) => {
-            let (span, message, help) = syntax_error(&error, text);
+            let (span, message, help) = syntax_error(&error, text, "robot");
             findings.error(span, message, help);
             return None;
         }
@@ -59,7 +58,8 @@ pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings) -> Opt
 fn read_robot(reader: &mut Reader, node: Node, options: &ImportOptions) -> Option<RawModel> {
     if node.tag_name().name() != "robot" {
         let help = match node.tag_name().name() {
-            "sdf" | "mujoco" | "MujocoInput" => "convert it to URDF: no other XML format is read",
+            "mujoco" => "a MuJoCo model is read from a file that ends in `.xml` or `.mjcf`",
+            "sdf" | "MujocoInput" => "convert it to URDF: of XML formats, URDF and MJCF are read",
             _ => "a URDF file is one `robot` element",
         };
         reader.findings.error(place(node), format!("{} is not a robot", quote(shown(node))), help);
@@ -75,11 +75,9 @@ fn read_robot(reader: &mut Reader, node: Node, options: &ImportOptions) -> Optio
             None
         }
     };
-    let mut taken = shape::Taken::default();
+    let mut taken = Taken::default();
     if let Some(floor) = options.floor {
-        raw.shapes.push(plane(taken.free("floor"), floor));
-        raw.floor = Some(0);
-        raw.surface.friction = Some(number(floor.friction));
+        floor::add(floor, &mut taken, &mut raw);
     }
     for child in reader.children(node, &["link", "joint"], &IGNORED) {
         if child.tag_name().name() == "link" {
@@ -102,29 +100,8 @@ fn read_robot(reader: &mut Reader, node: Node, options: &ImportOptions) -> Optio
     }
     rename_ground(reader, &mut raw);
     add_base(reader, &mut raw, options.base);
-    raw.gravity = options.gravity.map(|g| RawGravity::Constant(Spanned::new(g.map(number), Span::FILE)));
+    raw.gravity = options.gravity.map(RawGravity::of_options);
     Some(raw)
-}
-
-/// A number of the options.
-fn number(x: f64) -> RawNumber {
-    Spanned::new(RawValue::Const(x), Span::FILE)
-}
-
-/// The plane across z of the ground.
-fn plane(name: String, floor: Floor) -> RawShape {
-    let xyz = Spanned::new([0.0, 0.0, floor.height].map(number), Span::FILE);
-    RawShape {
-        name: Spanned::new(name, Span::FILE),
-        body: None,
-        kind: SHAPES.iter().find(|spec| spec.word() == "plane").map(|spec| Spanned::new(spec, Span::FILE)),
-        placement: RawPlacement { xyz: Some(xyz), rotation: None },
-        radius: None,
-        length: None,
-        size: None,
-        semi_axes: None,
-        normal: None,
-    }
 }
 
 fn push_or_note<T>(list: &mut Vec<T>, item: Option<T>, incomplete: &mut bool) {

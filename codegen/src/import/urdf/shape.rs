@@ -2,52 +2,18 @@
 //!
 //! Most readers of a robot want no contacts. What is wrong with a shape is therefore a warning, and the shape left out.
 
-use std::collections::{HashMap, HashSet};
-
-use super::unused::Tally;
-use super::xml::{is_own, place, Reader};
 use crate::diag::Severity;
 use crate::import::raw::{RawNumber, RawPlacement, RawRotation, RawShape, RawValue, RawVec3};
 use crate::import::source::{Span, Spanned};
+use crate::import::taken::Taken;
+use crate::import::tally::Tally;
 use crate::import::words::quote;
+use crate::import::xml::{is_own, place, Reader};
 use crate::model::{ShapeSpec, SHAPES};
-use crate::names::identifier;
 use roxmltree::Node;
 
 const IDLE: &str = "a `collision` touches nothing unless a floor is asked for (`--floor` of `mbd simulate`)";
 const MESH: &str = "`mesh` of a `collision` is not used: only box, sphere, cylinder and capsule are read";
-
-/// As many contacts as a shape has with a plane: the corners of a box.
-const CONTACTS: usize = 8;
-
-/// The names of the shapes that were read.
-#[derive(Default)]
-pub(super) struct Taken {
-    identifiers: HashSet<String>,
-    /// The last number behind a name.
-    last: HashMap<String, usize>,
-}
-
-impl Taken {
-    /// `wanted`, with a number where an identifier that it becomes is taken: its own, or one of its contacts, which are
-    /// numbered.
-    pub(super) fn free(&mut self, wanted: &str) -> String {
-        let of = |name: &str| {
-            let own = identifier(name);
-            (1..=CONTACTS).map(|k| format!("{own}_{k}")).chain([own.clone()]).collect::<Vec<_>>()
-        };
-        let mut name = wanted.to_string();
-        let mut all = of(&name);
-        while all.iter().any(|one| self.identifiers.contains(one)) {
-            let last = self.last.entry(wanted.to_string()).or_insert(1);
-            *last += 1;
-            name = format!("{wanted}_shape_{last}");
-            all = of(&name);
-        }
-        self.identifiers.extend(all);
-        name
-    }
-}
 
 /// Reads the shapes of a link. Without a floor they are said to touch nothing.
 pub(super) fn all(
@@ -116,7 +82,7 @@ fn shape(reader: &Reader, node: Node, body: &Spanned<String>, taken: &mut Taken)
         },
     };
     let given = reader.attribute(node, "name").map(|n| n.value.trim()).filter(|n| !n.is_empty());
-    let name = taken.free(given.unwrap_or(&body.value));
+    let name = taken.shape(given.unwrap_or(&body.value));
     Ok(RawShape {
         name: Spanned::new(name, place(node)),
         body: Some(body.clone()),

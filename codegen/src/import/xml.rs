@@ -1,6 +1,6 @@
 //! Reads attributes and numbers with their places from XML. Nothing here is specific to robots.
 
-use super::unused::Tally;
+use super::tally::Tally;
 use crate::diag::Severity;
 use crate::import::raw::{RawNumber, RawValue, RawVec3};
 use crate::import::source::{Findings, Span, Spanned};
@@ -9,7 +9,7 @@ use roxmltree::{Error, Node};
 use std::borrow::Cow;
 
 /// Findings that are collected while reading.
-pub(super) struct Reader<'f, 'a> {
+pub(crate) struct Reader<'f, 'a> {
     /// Findings, one by one.
     pub findings: &'f mut Findings<'a>,
     /// Findings that are counted by kind.
@@ -17,7 +17,7 @@ pub(super) struct Reader<'f, 'a> {
 }
 
 /// A text whose declaration does not stand first, as it has to: with blanks in its place, so that all places stay.
-pub(super) fn without_late_declaration<'t>(text: &'t str, findings: &mut Findings) -> Cow<'t, str> {
+pub(crate) fn without_late_declaration<'t>(text: &'t str, findings: &mut Findings) -> Cow<'t, str> {
     let start = text.len() - text.trim_start().len();
     let (true, Some(length)) = (start > 0 && text[start..].starts_with("<?xml "), text[start..].find("?>")) else {
         return Cow::Borrowed(text);
@@ -34,20 +34,20 @@ pub(super) fn without_late_declaration<'t>(text: &'t str, findings: &mut Finding
 }
 
 /// Place of the opening `<name` of an element.
-pub(super) fn place(node: Node) -> Span {
+pub(crate) fn place(node: Node) -> Span {
     let start = node.range().start;
     Span::new(start, start + 1 + node.tag_name().name().len())
 }
 
 /// Name of an element in messages, with its prefix, if it has one.
-pub(super) fn shown<'a>(node: Node<'a, '_>) -> &'a str {
+pub(crate) fn shown<'a>(node: Node<'a, '_>) -> &'a str {
     let text = &node.document().input_text()[node.range()];
     let end = text.char_indices().skip(1).find(|(_, c)| c.is_whitespace() || matches!(c, '/' | '>'));
     text.get(1..end.map_or(text.len(), |(k, _)| k)).unwrap_or("")
 }
 
 /// Whether the name of `node` is one of this file's own: in no namespace, or in the one the root element has.
-pub(super) fn is_own(node: Node) -> bool {
+pub(crate) fn is_own(node: Node) -> bool {
     let space = node.tag_name().namespace();
     space.is_none() || space == node.document().root_element().tag_name().namespace()
 }
@@ -207,7 +207,8 @@ impl Reader<'_, '_> {
         Some(Spanned::new(words.map(|word| self.parse_number(word, text.span, &what)), text.span))
     }
 
-    fn parse_number(&mut self, text: &str, span: Span, what: &str) -> RawNumber {
+    /// A finite number, as `what` in findings.
+    pub fn parse_number(&mut self, text: &str, span: Span, what: &str) -> RawNumber {
         let word = text.trim();
         let (message, help) = match word.parse::<f64>() {
             Ok(x) if x.is_finite() => return Spanned::new(RawValue::Const(x), span),
@@ -237,8 +238,8 @@ fn is_macro(text: &str) -> bool {
 const REMOVE: &str = "remove it if the motion does not depend on it";
 const XACRO: &str = "this looks like a xacro file: expand it with `xacro` and read the result";
 
-/// What is wrong with the XML, where, and what to do.
-pub(super) fn syntax_error(error: &Error, text: &str) -> (Span, String, String) {
+/// What is wrong with the XML of a file whose outermost element is called `root`, where, and what to do.
+pub(crate) fn syntax_error(error: &Error, text: &str, root: &str) -> (Span, String, String) {
     let p = error.pos();
     let at = offset(text, p.row as usize, p.col as usize);
     let here = Span::new(at, at + 1);
@@ -252,7 +253,7 @@ pub(super) fn syntax_error(error: &Error, text: &str) -> (Span, String, String) 
         Error::UnclosedRootNode | Error::UnexpectedEndOfStream => {
             (end, "the file ends inside an element".into(), "close every element; is the file complete?".into())
         }
-        Error::NoRootNode => (Span::FILE, "there is no `robot` in this file".into(), "is the file complete?".into()),
+        Error::NoRootNode => (Span::FILE, format!("there is no `{root}` in this file"), "is the file complete?".into()),
         Error::DtdDetected => {
             let at = text.find("<!DOCTYPE").unwrap_or(0);
             let help = "remove `<!DOCTYPE ...>` and write out the entities it defines";
@@ -261,7 +262,7 @@ pub(super) fn syntax_error(error: &Error, text: &str) -> (Span, String, String) 
         Error::UnknownNamespace(prefix, _) => (
             here,
             format!("prefix {} is not declared", quote(&format!("{prefix}:"))),
-            "declare it with `xmlns:...` in `robot`; if this is a xacro file, expand it with `xacro`".into(),
+            format!("declare it with `xmlns:...` in `{root}`; if this is a xacro file, expand it with `xacro`"),
         ),
         Error::DuplicatedAttribute(name, _) => {
             (here, format!("second attribute {}", quote(name)), "keep one of them".into())

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 
 /// Findings grouped by kind, in the order of their first places.
 #[derive(Debug, Default)]
-pub(super) struct Tally {
+pub(crate) struct Tally {
     groups: Vec<Group>,
     index: HashMap<String, usize>,
 }

@@ -1,37 +1,43 @@
-//! Eigenvalues of a symmetric 3 x 3 matrix.
+//! Eigenvalues and eigenvectors of a symmetric 3 x 3 matrix.
 //!
 //! Written here and not taken from a linear algebra crate because this crate is built into every macro expansion: 30
 //! lines are cheaper than that dependency in every user's build.
 
 /// A full symmetric matrix from `[xx, yy, zz, xy, xz, yz]`.
-pub(super) fn full(s: [f64; 6]) -> [[f64; 3]; 3] {
+pub(crate) fn full(s: [f64; 6]) -> [[f64; 3]; 3] {
     [[s[0], s[3], s[4]], [s[3], s[1], s[5]], [s[4], s[5], s[2]]]
 }
 
 /// Eigenvalues of `[xx, yy, zz, xy, xz, yz]` in rising order, to rounding relative to the largest (cyclic Jacobi);
 /// `None` unless all entries are finite.
-pub(super) fn eigenvalues(s: [f64; 6]) -> Option<[f64; 3]> {
+pub(crate) fn eigenvalues(s: [f64; 6]) -> Option<[f64; 3]> {
+    let (mut values, _) = eigenvectors(s)?;
+    values.sort_by(f64::total_cmp);
+    Some(values)
+}
+
+/// Eigenvalues in any order, and the matrix that has their eigenvectors, of unit length, as its columns.
+pub(crate) fn eigenvectors(s: [f64; 6]) -> Option<([f64; 3], [[f64; 3]; 3])> {
     let scale = s.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
     if s.iter().any(|x| !x.is_finite()) {
         return None;
     }
+    let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     if scale == 0.0 {
-        return Some([0.0; 3]);
+        return Some(([0.0; 3], v));
     }
     let mut a = full(s.map(|x| x / scale));
     // Convergence is quadratic: 6 sweeps reach rounding from anywhere, the rest is margin.
     for _ in 0..12 {
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            rotate(&mut a, p, q);
+            rotate(&mut a, &mut v, p, q);
         }
     }
-    let mut values = [a[0][0] * scale, a[1][1] * scale, a[2][2] * scale];
-    values.sort_by(f64::total_cmp);
-    Some(values)
+    Some(([a[0][0] * scale, a[1][1] * scale, a[2][2] * scale], v))
 }
 
-/// The rotation in the plane `p, q` that makes `a[p][q]` zero.
-fn rotate(a: &mut [[f64; 3]; 3], p: usize, q: usize) {
+/// The rotation in the plane `p, q` that makes `a[p][q]` zero, also of the columns of `v`.
+fn rotate(a: &mut [[f64; 3]; 3], v: &mut [[f64; 3]; 3], p: usize, q: usize) {
     if a[p][q] == 0.0 {
         return;
     }
@@ -48,6 +54,9 @@ fn rotate(a: &mut [[f64; 3]; 3], p: usize, q: usize) {
         (a[p][k], a[q][k]) = (c * x - s * y, s * x + c * y);
     }
     (a[p][q], a[q][p]) = (0.0, 0.0);
+    for row in v {
+        (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+    }
 }
 
 #[cfg(test)]

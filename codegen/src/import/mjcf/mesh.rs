@@ -1,0 +1,343 @@
+//! `mesh`: volumes and inertias of meshes, from STL, OBJ and MSH files or from the vertices in the file itself.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use super::classes::{Classes, MAIN};
+use super::element::{choice, flag, numbers, parsed, vec3, Element};
+use super::pose::{normalised, rotate, Pose, Quat, NONE};
+use crate::import::source::Spanned;
+use crate::import::words::quote;
+use crate::import::xml::{place, Reader};
+use crate::import::ReadFile;
+use crate::inertia::{cross, dot};
+use roxmltree::Node;
+
+const ATTRIBUTES: &[&str] = &[
+    "name",
+    "class",
+    "content_type",
+    "file",
+    "vertex",
+    "normal",
+    "texcoord",
+    "face",
+    "refpos",
+    "refquat",
+    "scale",
+    "smoothnormal",
+    "maxhullvert",
+    "inertia",
+    "builtin",
+    "params",
+    "material",
+];
+
+/// Most triangles of a mesh.
+const MOST: usize = 2_000_000;
+
+/// A triangle by its corners, m.
+type Triangle = [[f64; 3]; 3];
+
+/// The homogeneous body that a mesh bounds.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Solid {
+    /// Volume, m³, or area of a shell, m².
+    pub volume: f64,
+    /// Centre of mass in the axes of the mesh, m.
+    pub com: [f64; 3],
+    /// Inertia about it for a mass of 1, `[xx, yy, zz, xy, xz, yz]`, m².
+    pub inertia: [f64; 6],
+}
+
+/// How the inertia of a mesh is computed.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// Every pyramid between a face and the middle counts as full.
+    Legacy,
+    /// Pyramids count by the side of their face.
+    Exact,
+    /// The faces alone.
+    Shell,
+}
+
+/// The meshes of a file, each of which is read where a mass depends on it.
+pub(super) struct Meshes<'m, 'd> {
+    all: HashMap<String, Element<'d>>,
+    /// What was read; `None` where something was reported.
+    read: RefCell<HashMap<String, Option<Solid>>>,
+    folder: PathBuf,
+    files: ReadFile<'m>,
+}
+
+impl<'m, 'd> Meshes<'m, 'd> {
+    /// The meshes of the `asset` elements. `main` is the path of the main file, to whose folder those of `compiler` and
+    /// of the meshes are relative.
+    pub fn new(
+        reader: &mut Reader,
+        assets: &[Node<'d, 'd>],
+        compilers: &[Node<'d, 'd>],
+        classes: &Classes<'d>,
+        (main, files): (&Path, ReadFile<'m>),
+    ) -> Self {
+        let stated = |key: &str| compilers.iter().rev().find_map(|node| Element::plain(*node).attribute(key));
+        let folder = stated("meshdir").or(stated("assetdir")).map_or("", |folder| folder.value);
+        let strip = compilers.iter().any(|node| flag(reader, &Element::plain(*node), "strippath", "") == Some(true));
+        let mut all = HashMap::new();
+        for node in assets.iter().flat_map(|asset| asset.children()).filter(|node| node.has_tag_name("mesh")) {
+            let element = classes.resolve(reader, node, &["mesh"], MAIN);
+            reader.attributes(node, ATTRIBUTES);
+            let file = element.attribute("file").map(|file| Path::new(file.value));
+            let stem = || Some(file?.file_stem()?.to_string_lossy().into_owned());
+            let Some(name) = element.name().map(|name| name.value.to_string()).or_else(stem) else { continue };
+            all.insert(name, element);
+        }
+        let folder = if strip { PathBuf::new() } else { main.parent().unwrap_or(Path::new("")).join(folder) };
+        Meshes { all, read: RefCell::default(), folder, files }
+    }
+
+    /// The body that a mesh bounds; `None` where something was reported, once for each mesh.
+    pub fn solid(&self, reader: &mut Reader, name: &Spanned<&str>) -> Option<Solid> {
+        if let Some(known) = self.read.borrow().get(name.value) {
+            return *known;
+        }
+        let solid = match self.all.get(name.value) {
+            Some(element) => self.of_asset(reader, element, name.value),
+            None => {
+                let message = format!("{} is not a mesh", quote(name.value));
+                reader.findings.error(name.span, message, "add it to `asset`");
+                None
+            }
+        };
+        self.read.borrow_mut().insert(name.value.to_string(), solid);
+        solid
+    }
+
+    fn of_asset(&self, reader: &mut Reader, element: &Element, name: &str) -> Option<Solid> {
+        let whose = format!("mesh {}: ", quote(name));
+        let kind = choice(reader, element, "inertia", &["legacy", "exact", "shell", "convex"], &whose);
+        let kind = match kind.as_ref().map_or("legacy", |word| word.value) {
+            "exact" => Ok(Kind::Exact),
+            "shell" => Ok(Kind::Shell),
+            "convex" => Err("the inertia of the convex hull of a mesh is not read"),
+            _ => Ok(Kind::Legacy),
+        };
+        let frame = Frame::read(reader, element, &whose);
+        let at = element.attribute("file").map_or(place(element.node), |file| file.span);
+        let read = kind.map_err(String::from).and_then(|kind| {
+            let mirrored = frame.scale.iter().product::<f64>() <= 0.0;
+            if mirrored && kind == Kind::Exact {
+                return Err("the exact inertia of a mirrored mesh is not read".into());
+            }
+            let triangles = self.triangles(reader, element, &whose)?;
+            solid(&triangles.iter().map(|t| t.map(|v| frame.point(v))).collect::<Vec<_>>(), kind)
+        });
+        match read {
+            Ok(solid) => Some(solid),
+            Err(problem) => {
+                let help = "give the bodies an `inertial` (MuJoCo writes all of them with `saveinertial=\"true\"`)";
+                reader.findings.error(at, format!("{whose}{problem}"), help);
+                None
+            }
+        }
+    }
+
+    /// The faces of a mesh in its own axes.
+    fn triangles(&self, reader: &mut Reader, element: &Element, whose: &str) -> Result<Vec<Triangle>, String> {
+        if element.attribute("builtin").is_some() {
+            return Err("a mesh that MuJoCo makes is not read".into());
+        }
+        let Some(file) = element.attribute("file") else { return inline(reader, element, whose) };
+        let path = Path::new(file.value);
+        if path.is_absolute() || path.has_root() {
+            return Err("its path is not relative to the main file".into());
+        }
+        let path = self.folder.join(path);
+        let bytes = (self.files)(&path).map_err(|error| format!("cannot read {}: {error}", quote(file.value)))?;
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        match extension.as_deref() {
+            Some("stl") => stl(&bytes),
+            Some("msh") => msh(&bytes),
+            Some("obj") => obj(&bytes),
+            _ => Err("meshes are read from STL, OBJ and MSH files".into()),
+        }
+    }
+}
+
+/// What is done to the vertices.
+struct Frame {
+    origin: [f64; 3],
+    quat: Quat,
+    scale: [f64; 3],
+}
+
+impl Frame {
+    fn read(reader: &mut Reader, element: &Element, whose: &str) -> Frame {
+        let quat = numbers(reader, element, "refquat", 4..=4, whose);
+        Frame {
+            origin: vec3(reader, element, "refpos", whose).map_or([0.0; 3], |x| x.value),
+            quat: quat.and_then(|q| normalised(<Quat>::try_from(q.value).ok()?)).unwrap_or(NONE),
+            scale: vec3(reader, element, "scale", whose).map_or([1.0; 3], |x| x.value),
+        }
+    }
+
+    fn point(&self, v: [f64; 3]) -> [f64; 3] {
+        let inverse = Pose { xyz: [0.0; 3], quat: self.quat }.inverse();
+        let turned = rotate(inverse.quat, [0, 1, 2].map(|k| v[k] - self.origin[k]));
+        [0, 1, 2].map(|k| turned[k] * self.scale[k])
+    }
+}
+
+/// Vertices and faces that stand in the file.
+fn inline(reader: &mut Reader, element: &Element, whose: &str) -> Result<Vec<Triangle>, String> {
+    let (Some(vertices), Some(faces)) = (element.attribute("vertex"), element.attribute("face")) else {
+        return Err("a mesh without `file`, or without `face`, is not read".into());
+    };
+    let mut all = |text: &Spanned<&str>, key| {
+        let all = parsed(reader, text, key, 3..=9 * MOST, whose);
+        all.map(|all| all.value).ok_or_else(|| format!("its `{key}` is not read"))
+    };
+    let (vertices, faces) = (all(&vertices, "vertex")?, all(&faces, "face")?);
+    // MuJoCo keeps vertices in single precision.
+    let vertices: Vec<[f64; 3]> = vertices.chunks_exact(3).map(|v| [0, 1, 2].map(|k| f64::from(v[k] as f32))).collect();
+    let faces = faces.chunks_exact(3).map(|f| [0, 1, 2].map(|k| if f[k] >= 0.0 { f[k] as usize } else { usize::MAX }));
+    corners(&vertices, faces)
+}
+
+/// Triangles from indices of vertices.
+fn corners(vertices: &[[f64; 3]], faces: impl Iterator<Item = [usize; 3]>) -> Result<Vec<Triangle>, String> {
+    let mut all = Vec::new();
+    for face in faces.take(MOST) {
+        let corner = |k: usize| vertices.get(face[k]).copied();
+        let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) else {
+            return Err("a face has a vertex that there is not".into());
+        };
+        all.push([a, b, c]);
+    }
+    Ok(all)
+}
+
+/// Three numbers of single precision, in the byte order of these files.
+fn single(bytes: &[u8]) -> [f64; 3] {
+    let at =
+        |k: usize| bytes.get(4 * k..4 * k + 4).and_then(|b| b.try_into().ok()).map_or(f32::NAN, f32::from_le_bytes);
+    [0, 1, 2].map(|k| f64::from(at(k)))
+}
+
+fn integer(bytes: &[u8], at: usize) -> Option<usize> {
+    let four = bytes.get(at..at + 4)?.try_into().ok()?;
+    usize::try_from(i32::from_le_bytes(four)).ok()
+}
+
+/// A binary STL file.
+fn stl(bytes: &[u8]) -> Result<Vec<Triangle>, String> {
+    let wrong = || "the STL file has another size than its header says; perhaps it is one of text".to_string();
+    let count = integer(bytes, 80).filter(|n| (1..=MOST).contains(n)).ok_or_else(wrong)?;
+    if bytes.len() != 84 + 50 * count {
+        return Err(wrong());
+    }
+    let corner = |face: &[u8], k: usize| single(&face[12 * (k + 1)..]);
+    Ok(bytes[84..].chunks_exact(50).map(|face| [0, 1, 2].map(|k| corner(face, k))).collect())
+}
+
+/// A file of MuJoCo's own format.
+fn msh(bytes: &[u8]) -> Result<Vec<Triangle>, String> {
+    let wrong = || "the MSH file has another size than its header says".to_string();
+    let counts = [0, 4, 8, 12].map(|at| integer(bytes, at).filter(|n| *n <= MOST));
+    let [Some(vertices), Some(normals), Some(textures), Some(faces)] = counts else { return Err(wrong()) };
+    let start = 16 + 12 * vertices + 12 * normals + 8 * textures;
+    if bytes.len() != start + 12 * faces {
+        return Err(wrong());
+    }
+    if faces == 0 {
+        return Err("a mesh without faces is not read".into());
+    }
+    let vertices: Vec<[f64; 3]> = bytes[16..16 + 12 * vertices].chunks_exact(12).map(single).collect();
+    let index = |face: &[u8], k: usize| integer(face, 4 * k).unwrap_or(usize::MAX);
+    corners(&vertices, bytes[start..].chunks_exact(12).map(|face| [0, 1, 2].map(|k| index(face, k))))
+}
+
+/// An OBJ file of triangles.
+fn obj(bytes: &[u8]) -> Result<Vec<Triangle>, String> {
+    let text = std::str::from_utf8(bytes).map_err(|_| "the OBJ file is no text".to_string())?;
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    for (k, line) in text.lines().enumerate() {
+        let mut words = line.split_whitespace();
+        let wrong = || format!("line {} of the OBJ file is not read", k + 1);
+        match words.next() {
+            Some("v") => {
+                let all: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
+                let [x, y, z, ..] = all[..] else { return Err(wrong()) };
+                vertices.push([x, y, z].map(|x: f64| f64::from(x as f32)));
+            }
+            Some("f") => {
+                let index = |word: &str| {
+                    let k: i64 = word.split('/').next()?.parse().ok()?;
+                    let count = i64::try_from(vertices.len()).ok()?;
+                    usize::try_from(if k < 0 { count.checked_add(k)? } else { k - 1 }).ok()
+                };
+                let all: Option<Vec<usize>> = words.map(index).collect();
+                let Some(&[a, b, c]) = all.as_deref() else {
+                    return Err(format!("line {} of the OBJ file is no triangle", k + 1));
+                };
+                faces.push([a, b, c]);
+            }
+            _ => {}
+        }
+    }
+    corners(&vertices, faces.into_iter())
+}
+
+/// Volume, centre of mass and inertia as MuJoCo computes them.
+fn solid(triangles: &[Triangle], kind: Kind) -> Result<Solid, String> {
+    let normal = |[a, b, c]: &Triangle| {
+        let edge = |p: &[f64; 3]| [0, 1, 2].map(|k| p[k] - a[k]);
+        cross(edge(b), edge(c)).map(|x| x / 2.0)
+    };
+    let middle = |[a, b, c]: &Triangle| [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);
+    let area = |t: &Triangle| dot(normal(t), normal(t)).sqrt();
+    // The volume of the pyramid over a face, or the area of the face.
+    let measure = |t: &Triangle, from: [f64; 3]| {
+        let centre = middle(t);
+        let volume = dot([0, 1, 2].map(|k| centre[k] - from[k]), normal(t)) / 3.0;
+        match kind {
+            Kind::Legacy => volume.abs(),
+            Kind::Exact => volume,
+            Kind::Shell => area(t),
+        }
+    };
+    let total = |weight: &dyn Fn(&Triangle) -> f64, point: &dyn Fn(&Triangle) -> [f64; 3]| {
+        let mut sum = (0.0, [0.0; 3]);
+        for t in triangles {
+            let (w, p) = (weight(t), point(t));
+            sum.0 += w;
+            (0..3).for_each(|k| sum.1[k] += w * p[k]);
+        }
+        (sum.0, sum.1.map(|x| x / sum.0))
+    };
+    let (_, centre) = total(&area, &middle);
+    let pyramid = |t: &Triangle| {
+        let face = middle(t);
+        [0, 1, 2].map(|k| face[k] * 3.0 / 4.0 + centre[k] / 4.0)
+    };
+    let (volume, com) = total(&|t| measure(t, centre), &pyramid);
+    if !(volume > 1e-15 && volume.is_finite() && com.iter().all(|x| x.is_finite())) {
+        return Err("the mesh bounds no volume".into());
+    }
+    let centred = |t: &Triangle| t.map(|v| [0, 1, 2].map(|k| v[k] - com[k]));
+    let (mut volume, mut products) = (0.0, [0.0; 6]);
+    for t in triangles {
+        let [d, e, f] = centred(t);
+        let w = measure(&[d, e, f], [0.0; 3]);
+        volume += w;
+        let share = w / if kind == Kind::Shell { 12.0 } else { 20.0 };
+        for (slot, (i, j)) in products.iter_mut().zip([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]) {
+            let own = 2.0 * (d[i] * d[j] + e[i] * e[j] + f[i] * f[j]);
+            let mixed = [(d, e), (d, f), (e, f)].map(|(p, q)| p[i] * q[j] + p[j] * q[i]);
+            *slot += share * (own + mixed[0] + mixed[1] + mixed[2]);
+        }
+    }
+    let [x, y, z, xy, xz, yz] = products.map(|p| p / volume);
+    Ok(Solid { volume, com, inertia: [y + z, x + z, x + y, -xy, -xz, -yz] })
+}
