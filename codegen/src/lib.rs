@@ -41,3 +41,4 @@ pub use generate::{
     generate, transfer_code, Arithmetic, CountsOfModes, GenerateError, Generated, Options, Output, Precision,
     RolledCode,
 };
+pub use names::camel_case;

@@ -31,6 +31,16 @@ pub fn identifier(name: &str) -> String {
     out
 }
 
+/// Name of a type for the name of a model: `DoublePendulum` for `double_pendulum`.
+pub fn camel_case(name: &str) -> String {
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
+    let camel: String = words.map(|w| w[..1].to_ascii_uppercase() + &w[1..]).collect();
+    match camel.starts_with(|c: char| c.is_ascii_alphabetic()) && camel != "Self" {
+        true => camel,
+        false => format!("Model{camel}"),
+    }
+}
+
 /// ASCII letters, digits and `_` for a name in any script. Tools that read C know no other letters.
 fn ascii(name: &str) -> String {
     let mut out = String::new();

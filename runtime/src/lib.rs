@@ -29,6 +29,7 @@ pub mod kernel;
 #[cfg(feature = "alloc")]
 pub mod layout;
 pub mod notation;
+mod packed;
 mod scalar;
 pub mod spatial;
 #[cfg(feature = "alloc")]
@@ -49,6 +50,7 @@ pub use dual::Dual;
 pub use error::{ConstraintError, Named, StepError};
 #[cfg(feature = "alloc")]
 pub use interp::{Interpreter, MassMatrixError};
+pub use packed::Packed;
 pub use scalar::Scalar;
 pub use system::{
     Accelerated, Conjugate, Constrained, Differentiable, Energetic, MomentumDerivatives, Real, StateDerivatives, System,

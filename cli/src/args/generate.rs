@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use multibody::codegen::options::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
 use multibody::codegen::output;
-use multibody::codegen::{Arithmetic, Options, Output, Precision, RolledCode};
+use multibody::codegen::{camel_case, Arithmetic, Options, Output, Precision, RolledCode};
 
-use super::values::{camel_case, choice, outputs, rust_path, snap, type_name};
+use super::values::{choice, outputs, rust_path, snap, type_name};
 use super::ModelArgs;
 
 /// Options of the generated code.

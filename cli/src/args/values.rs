@@ -117,13 +117,3 @@ pub fn type_name(text: &str) -> Result<String, String> {
         Err("a type is named with letters, digits and `_`, an upper-case letter first".to_string())
     }
 }
-
-/// Converts `double_pendulum` to `DoublePendulum`.
-pub fn camel_case(name: &str) -> String {
-    let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
-    let camel: String = words.map(|w| w[..1].to_ascii_uppercase() + &w[1..]).collect();
-    match camel.starts_with(|c: char| c.is_ascii_alphabetic()) && camel != "Self" {
-        true => camel,
-        false => format!("Model{camel}"),
-    }
-}

@@ -6,12 +6,13 @@ use mbd_runtime::contact::{Reducible, Way};
 use mbd_runtime::Interpreter;
 
 use super::instructions::INPUTS;
+use super::lanes::LanesCode;
 use super::memory::{MachineCode, Number};
 use super::CompileError;
 use crate::code::{compile, Code};
 use crate::model::{Gravity, Model};
 use crate::options::Options;
-use crate::output::{Output, OutputProgram, Sizes, Spec};
+use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
 use crate::rolled::rolled;
 use crate::search;
@@ -37,7 +38,7 @@ const MOST_BODIES: usize = MOST_OPERATIONS / 50;
 /// [`Compiled::inputs`].
 #[derive(Clone, Debug)]
 pub struct Compiled<S: Number = f64> {
-    shared: Arc<Shared<S>>,
+    pub(super) shared: Arc<Shared<S>>,
     pub(super) interpreter: Interpreter<S>,
     /// Whether the interpreter computes everything.
     interpreted: bool,
@@ -55,43 +56,51 @@ pub struct Compiled<S: Number = f64> {
 
 /// What all clones have in common.
 #[derive(Debug)]
-struct Shared<S> {
+pub(super) struct Shared<S> {
     plan: Plan,
     options: Options,
     sizes: Sizes,
     /// One for each of [`Output::ALL`].
     outputs: Vec<OnceLock<Result<MachineCode<S>, CompileError>>>,
     coordinate_rates: OnceLock<Result<MachineCode<S>, CompileError>>,
+    /// Code for several states at once.
+    pub(super) lanes: OnceLock<Result<LanesCode, CompileError>>,
 }
 
 impl<S: Number> Shared<S> {
     /// Compiles a program.
-    fn machine_code(&self, program: &OutputProgram<Code>) -> Result<MachineCode<S>, CompileError> {
+    fn machine_code(&self, program: &OutputProgram<Code>, lanes: usize) -> Result<MachineCode<S>, CompileError> {
         let results = program.spec.results.iter().map(|array| array.len(&self.sizes)).collect();
-        MachineCode::new(program, results, self.options.arithmetic)
+        MachineCode::new(program, results, self.options.arithmetic, lanes)
+    }
+
+    /// Compiles an output, if it is not too large.
+    pub(super) fn compiled(&self, output: Output, lanes: usize) -> Result<MachineCode<S>, CompileError> {
+        let (plan, options, most) = (&self.plan, &self.options, MOST_OPERATIONS);
+        if plan.nodes.len() > MOST_BODIES && rolled(plan, output, options).is_none() {
+            return Err(CompileError::TooLarge { output, operations: None, most });
+        }
+        let program = compile(plan, output, options)?;
+        let operations = program.program.operations().count();
+        match operations > most {
+            true => Err(CompileError::TooLarge { output, operations: Some(operations), most }),
+            false => self.machine_code(&program, lanes),
+        }
     }
 
     /// The code of an output, made when it is first asked for.
     fn output(&self, output: Output) -> Result<&MachineCode<S>, &CompileError> {
-        let make = || {
-            let (plan, options, most) = (&self.plan, &self.options, MOST_OPERATIONS);
-            if plan.nodes.len() > MOST_BODIES && rolled(plan, output, options).is_none() {
-                return Err(CompileError::TooLarge { output, operations: None, most });
-            }
-            let program = compile(plan, output, options)?;
-            let operations = program.program.operations().count();
-            match operations > most {
-                true => Err(CompileError::TooLarge { output, operations: Some(operations), most }),
-                false => self.machine_code(&program),
-            }
-        };
+        let make = || self.compiled(output, 1);
         // The list has the order of the enumeration.
         self.outputs[output as usize].get_or_init(make).as_ref()
     }
 
     fn coordinate_rates(&self) -> Result<&MachineCode<S>, &CompileError> {
-        let make = || self.machine_code(&coordinate_rates(&self.plan, &self.options).map(Code::Straight));
-        self.coordinate_rates.get_or_init(make).as_ref()
+        self.coordinate_rates.get_or_init(|| self.compiled_coordinate_rates(1)).as_ref()
+    }
+
+    pub(super) fn compiled_coordinate_rates(&self, lanes: usize) -> Result<MachineCode<S>, CompileError> {
+        self.machine_code(&coordinate_rates(&self.plan, &self.options).map(Code::Straight), lanes)
     }
 }
 
@@ -118,7 +127,8 @@ impl<S: Number> Compiled<S> {
         let params: Vec<S> = plan.default_params().into_iter().map(S::constant).collect();
         let interpreter = plan.interpreter(&params);
         let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
-        let shared = Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new() };
+        let shared =
+            Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new(), lanes: OnceLock::new() };
         let (acts, shared) = (vec![S::one(); sizes.acts], Arc::new(shared));
         let (scratch, copies) = (Vec::new(), Vec::new());
         Ok(Compiled {
@@ -219,8 +229,7 @@ impl<S: Number> Compiled<S> {
         results: &mut [&mut [S]],
     ) -> Result<(), CompileError> {
         let code = self.shared.output(output).map_err(CompileError::clone)?;
-        check(output.spec(), &self.shared.sizes, arguments, results)
-            .map_err(|words| CompileError::Arrays { output, words })?;
+        self.check_arrays(output, arguments, results)?;
         let given = |k: usize| arguments.get(k).copied().unwrap_or_default();
         let scratch = long_enough(&mut self.scratch, code);
         call(code, [given(0), given(1), given(2)], (&self.interpreter, &self.params, &self.acts), results, scratch);
@@ -302,7 +311,8 @@ impl<S: Number> Compiled<S> {
         let plan = plan.acting(acts);
         let interpreter = self.interpreter.acting(acts);
         let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
-        let shared = Shared { plan, options, sizes: *sizes, outputs, coordinate_rates: OnceLock::new() };
+        let shared =
+            Shared { plan, options, sizes: *sizes, outputs, coordinate_rates: OnceLock::new(), lanes: OnceLock::new() };
         Compiled { shared: Arc::new(shared), interpreter, calls: vec![0; self.calls.len()], ..self.clone() }
     }
 
@@ -383,18 +393,4 @@ fn call<S: Number>(
     let given: [&[S]; INPUTS] =
         [a, b, c, tau, drive_q, drive_v, drive_a, wrenches.as_flattened(), params, acts, gravity];
     code.call(&given, results, scratch);
-}
-
-/// Compares the lengths of arguments and results with those of an output.
-fn check<S>(spec: &Spec, sizes: &Sizes, arguments: &[&[S]], results: &[&mut [S]]) -> Result<(), String> {
-    let lengths = |arrays: &[crate::output::Array]| arrays.iter().map(|a| a.len(sizes)).collect::<Vec<_>>();
-    let given = [arguments.iter().map(|a| a.len()).collect(), results.iter().map(|r| r.len()).collect::<Vec<_>>()];
-    for (name, given, expected) in
-        [("arguments", &given[0], lengths(spec.inputs)), ("results", &given[1], lengths(spec.results))]
-    {
-        if *given != expected {
-            return Err(format!("its {name} have the lengths {expected:?}, and {given:?} were given"));
-        }
-    }
-    Ok(())
 }

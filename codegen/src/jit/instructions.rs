@@ -30,6 +30,9 @@ pub const INPUTS: usize = ARGUMENTS + FIELDS.len();
 pub struct Shape<'a> {
     /// The number type.
     pub precision: Precision,
+    /// Number of states that are computed at once: one, or as many as a vector of 16 bytes has numbers. Every array but
+    /// the tables of rolled code then has that many numbers for each entry.
+    pub lanes: usize,
     /// The type of an address.
     pub address: Type,
     /// Whether products and sums are one instruction.
@@ -81,6 +84,10 @@ pub fn write(function: &mut Function, program: &OutputProgram<Code>, shape: &Sha
         Precision::F64 => types::F64,
         Precision::F32 => types::F32,
     };
+    let number = match shape.lanes {
+        1 => number,
+        lanes => number.by(lanes as u32).expect("there are vectors of 16 bytes"),
+    };
     let mut writer = Writer { b, shape, number, inputs, outputs, memory, constants: table, sines };
     lower::lower(&mut writer, program, shape.results, shape.spills);
     writer.b.ins().return_(&[]);
@@ -92,7 +99,7 @@ pub fn write(function: &mut Function, program: &OutputProgram<Code>, shape: &Sha
 struct Writer<'a> {
     b: FunctionBuilder<'a>,
     shape: &'a Shape<'a>,
-    /// Type of the numbers, or of vectors of them while sines are written.
+    /// Type of the numbers: a vector of them for several states, and while sines are written.
     number: Type,
     /// Addresses of the input arrays.
     inputs: Vec<Value>,
@@ -122,9 +129,25 @@ impl Writer<'_> {
         i64::from(self.number.lane_type().bytes())
     }
 
+    /// Bytes of an entry of an array.
+    fn entry(&self, array: Array) -> i64 {
+        match array {
+            Array::Table(_) => self.size(),
+            _ => self.size() * self.shape.lanes as i64,
+        }
+    }
+
+    /// What is known of loads and stores. Entries of several numbers are aligned as one of them is.
+    fn access(&self) -> MemFlags {
+        match self.shape.lanes {
+            1 => MemFlags::trusted(),
+            _ => MemFlags::new().with_notrap(),
+        }
+    }
+
     /// Address and offset of an entry. An offset that is too large for an instruction is added to the address.
     fn address(&mut self, place: Place<Value>) -> (Value, i32) {
-        let size = self.size();
+        let size = self.entry(place.array);
         let (address, first) = match place.array {
             Array::Input(k) => (self.inputs[k], 0),
             Array::Result(k) => (self.outputs[k], 0),
@@ -181,6 +204,7 @@ impl Writer<'_> {
     /// within its range.
     fn by_main_path(&mut self, angles: &[Value]) -> (Vec<[Value; 2]>, Option<Value>) {
         let number = self.number;
+        // Vectors of several states are taken one by one.
         let lanes = (16 / number.bytes()) as usize;
         let (mut pairs, mut within): (Vec<[Value; 2]>, Option<Value>) = (Vec::new(), None);
         let vector = number.by(lanes as u32).expect("there are vectors of 16 bytes");
@@ -197,7 +221,7 @@ impl Writer<'_> {
             let size = self.b.ins().fabs(angle);
             // NaN is not within the range.
             let fits = self.b.ins().fcmp(FloatCC::LessThanOrEqual, size, limit);
-            let fits = if angles.len() > 1 { self.b.ins().vall_true(fits) } else { fits };
+            let fits = if self.number.is_vector() { self.b.ins().vall_true(fits) } else { fits };
             within = Some(within.map_or(fits, |within| self.b.ins().band(within, fits)));
             let pair = main_path(self, angle, self.shape.precision, self.shape.fused, |s, [shifted, _], pair| {
                 s.turned(shifted, pair)
@@ -213,22 +237,23 @@ impl Writer<'_> {
 
     /// Sines and cosines of numbers by the function that takes any angle.
     fn by_function(&mut self, angles: &[Value]) -> Vec<[Value; 2]> {
-        let bytes = self.number.bytes() * BLOCK as u32;
+        let lanes = self.shape.lanes;
         let slots = [0; 3].map(|_| {
-            let slot = StackSlotData::new(StackSlotKind::ExplicitSlot, bytes, 4);
+            let slot = StackSlotData::new(StackSlotKind::ExplicitSlot, self.size() as u32 * BLOCK as u32, 4);
             self.b.create_sized_stack_slot(slot)
         });
         let addresses = slots.map(|slot| self.b.ins().stack_addr(self.shape.address, slot, 0));
         let mut pairs = Vec::new();
-        for angles in angles.chunks(BLOCK) {
-            let offset = |lane: usize| (lane * bytes as usize / BLOCK) as i32;
-            for lane in 0..BLOCK {
-                let angle = angles.get(lane).unwrap_or(&angles[0]);
-                self.b.ins().stack_store(*angle, slots[0], offset(lane));
+        for angles in angles.chunks(BLOCK / lanes) {
+            let offset = |k: usize| (k * self.number.bytes() as usize) as i32;
+            let offsets: Vec<i32> = (0..BLOCK / lanes).map(offset).collect();
+            for (k, at) in offsets.iter().enumerate() {
+                let angle = angles.get(k).unwrap_or(&angles[0]);
+                self.b.ins().stack_store(*angle, slots[0], *at);
             }
-            self.call_sines(addresses, angles.len());
-            let part = |s: &mut Self, lane, part: usize| s.b.ins().stack_load(s.number, slots[part], offset(lane));
-            pairs.extend((0..angles.len()).map(|lane| [1, 2].map(|which| part(self, lane, which))));
+            self.call_sines(addresses, angles.len() * lanes);
+            let part = |s: &mut Self, at, part: usize| s.b.ins().stack_load(s.number, slots[part], at);
+            pairs.extend(offsets.iter().take(angles.len()).map(|at| [1, 2].map(|which| part(self, *at, which))));
         }
         pairs
     }
@@ -261,13 +286,17 @@ impl Instructions for Writer<'_> {
 
     fn load(&mut self, place: Place<Value>) -> Value {
         // Not `readonly`: such loads would be merged, and their values kept in registers that others need.
-        let (address, offset) = self.address(place);
-        self.b.ins().load(self.number, MemFlags::trusted(), address, offset)
+        let ((address, offset), access) = (self.address(place), self.access());
+        if let (Array::Table(_), true) = (place.array, self.number.is_vector()) {
+            let one = self.b.ins().load(self.number.lane_type(), MemFlags::trusted(), address, offset);
+            return self.b.ins().splat(self.number, one);
+        }
+        self.b.ins().load(self.number, access, address, offset)
     }
 
     fn store(&mut self, place: Place<Value>, value: Value) {
-        let (address, offset) = self.address(place);
-        self.b.ins().store(MemFlags::trusted(), value, address, offset);
+        let ((address, offset), access) = (self.address(place), self.access());
+        self.b.ins().store(access, value, address, offset);
     }
 
     fn operation(&mut self, operation: Operation<Value>) -> Value {
@@ -286,7 +315,12 @@ impl Instructions for Writer<'_> {
                 let (one, zero) = (self.constant(1.0), self.constant(0.0));
                 let reciprocal = self.b.ins().fdiv(one, value);
                 let below = self.b.ins().fcmp(FloatCC::LessThanOrEqual, value, floor);
-                self.b.ins().select(below, zero, reciprocal)
+                if !self.number.is_vector() {
+                    return self.b.ins().select(below, zero, reciprocal);
+                }
+                let flags = MemFlags::new().with_endianness(cranelift::codegen::ir::Endianness::Little);
+                let below = self.b.ins().bitcast(self.number, flags, below);
+                self.b.ins().bitselect(below, zero, reciprocal)
             }
             Operation::Sqrt(a) => self.b.ins().sqrt(a),
         }
@@ -314,10 +348,10 @@ impl Instructions for Writer<'_> {
 
     fn sines_of_array(&mut self, n: usize) {
         let arrays = [Array::Angles, Array::Sines, Array::Cosines].map(|array| {
-            let offset = self.size() * self.shape.memory.start(array) as i64;
+            let offset = self.entry(array) * self.shape.memory.start(array) as i64;
             self.b.ins().iadd_imm(self.memory, offset)
         });
-        self.call_sines(arrays, n);
+        self.call_sines(arrays, n * self.shape.lanes);
     }
 
     fn open_loop(&mut self, turns: usize, backward: bool, start: Vec<Value>) -> (Loop, Value, Vec<Value>) {

@@ -2,7 +2,7 @@
 //!
 //! The only `unsafe` code of the generator is in this file. It is sound for these reasons:
 //! - A function is called only through [`MachineCode::call`], which compares the length of every slice with that of the
-//!   array of which the code was made. The code reads and writes at constant places inside these arrays, in tables that
+//!   array of which the code was made, times the number of states that it computes at once. The code reads and writes at constant places inside these arrays, in tables that
 //!   the function owns, and in working memory whose length is compared too.
 //! - Input slices are shared and result slices are exclusive references, so that the code's loads and stores do not
 //!   meet those of others.
@@ -122,7 +122,8 @@ unsafe impl<S> Send for MachineCode<S> {}
 unsafe impl<S> Sync for MachineCode<S> {}
 
 impl<S: Number> MachineCode<S> {
-    /// Compiles a program whose results fill arrays of the lengths `results`.
+    /// Compiles a program whose results fill arrays of the lengths `results`, for one state or for `lanes` states at once:
+    /// as many as a vector of 16 bytes has numbers. All arrays then have that many numbers side by side for each entry.
     ///
     /// # Errors
     /// [`CompileError::Machine`] with Cranelift's words.
@@ -130,6 +131,7 @@ impl<S: Number> MachineCode<S> {
         program: &OutputProgram<Code>,
         results: Vec<usize>,
         arithmetic: Arithmetic,
+        lanes: usize,
     ) -> Result<Self, CompileError> {
         let fast = arithmetic == Arithmetic::Fast;
         let mut module = compiler(&program.program)?;
@@ -149,6 +151,7 @@ impl<S: Number> MachineCode<S> {
         let memory = Memory::new(&program.program, &spills, BLOCK);
         let shape = Shape {
             precision: S::PRECISION,
+            lanes,
             address,
             fused: fast && level() > Level::Plain,
             results: &results,
@@ -171,17 +174,17 @@ impl<S: Number> MachineCode<S> {
         let entry = unsafe { std::mem::transmute::<*const u8, Entry<S>>(code) };
         let mut inputs = [0; INPUTS];
         for (array, place) in program.inputs.iter().zip(input_places(&program.inputs)) {
-            inputs[place] = array.len();
+            inputs[place] = lanes * array.len();
         }
         let mut lengths = [0; RESULTS];
-        lengths[..results.len()].copy_from_slice(&results);
+        lengths.iter_mut().zip(&results).for_each(|(to, len)| *to = lanes * len);
         let results = (results.len(), lengths);
         Ok(MachineCode {
             module: Some(module),
             entry,
             inputs,
             results,
-            scratch: memory.len(),
+            scratch: lanes * memory.len(),
             size,
             constants: numbers(constants.into_keys().map(f64::from_bits).collect()),
             _tables: tables,

@@ -24,9 +24,12 @@
 mod compiled;
 mod error;
 mod instructions;
+mod interpreted;
+mod lanes;
 mod memory;
 mod traits;
 
 pub use compiled::Compiled;
 pub use error::CompileError;
+pub use lanes::{CompiledLanes, LANES};
 pub use memory::Number;

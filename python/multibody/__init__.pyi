@@ -1,0 +1,503 @@
+# Written by make_stubs.py.
+import os
+from typing import Any, Dict, List, Literal, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+_Array = NDArray[np.float64]
+_Path = Union[str, "os.PathLike[str]"]
+_Base = Literal["fixed", "floating", "planar"]
+_Params = Union[ArrayLike, Mapping[str, ArrayLike]]
+
+__version__: str
+__all__: List[str]
+
+class Finding(NamedTuple):
+    severity: str
+    file: str
+    line: int
+    column: int
+    message: str
+    help: str
+
+class ModelError(ValueError):
+    findings: List[Finding]
+
+class SimulationError(RuntimeError):
+    kind: str
+    time: float
+    row: int
+    numbers: Dict[str, float]
+
+class Rollout(NamedTuple):
+    q: _Array
+    v: _Array
+    failures: List[SimulationError]
+
+def load(
+    path: Optional[_Path] = ...,
+    *,
+    text: Optional[str] = ...,
+    format: str = ...,
+    base: _Base = ...,
+    gravity: Optional[Sequence[float]] = ...,
+    limits: bool = ...,
+    floor: Optional[Tuple[float, float]] = ...,
+    variant: Optional[str] = ...,
+    wrenches: Sequence[str] = ...,
+    arithmetic: Literal["fast", "exact"] = ...,
+    search: bool = ...,
+) -> Model: ...
+def check(
+    path: Optional[_Path] = ...,
+    *,
+    text: Optional[str] = ...,
+    format: str = ...,
+    base: _Base = ...,
+    gravity: Optional[Sequence[float]] = ...,
+    limits: bool = ...,
+    floor: Optional[Tuple[float, float]] = ...,
+) -> List[Finding]: ...
+def convert(
+    path: Optional[_Path] = ...,
+    *,
+    text: Optional[str] = ...,
+    format: str = ...,
+    base: _Base = ...,
+    gravity: Optional[Sequence[float]] = ...,
+    limits: bool = ...,
+) -> str: ...
+def methods() -> List[Tuple[str, str, bool]]: ...
+def outputs() -> List[Tuple[str, List[Tuple[str, str]], List[Tuple[str, str]], str]]: ...
+
+class _Rates(NamedTuple):
+    qd: _Array
+    pd: _Array
+
+class _Frames(NamedTuple):
+    rotation: _Array
+    position: _Array
+    velocity: _Array
+
+class _Centroidal(NamedTuple):
+    center: _Array
+    matrix: _Array
+    bias: _Array
+
+class _Derivatives(NamedTuple):
+    v: _Array
+    pd: _Array
+    dv_dq: _Array
+    dv_dp: _Array
+    dpd_dq: _Array
+    dpd_dp: _Array
+
+class _MomentumDerivatives(NamedTuple):
+    p: _Array
+    pd: _Array
+    dp_dq: _Array
+    dp_dv: _Array
+    dpd_dq: _Array
+    dpd_dv: _Array
+
+class _ParameterDerivatives(NamedTuple):
+    dv_dparams: _Array
+    dpd_dparams: _Array
+
+class _ConstraintResiduals(NamedTuple):
+    residual: _Array
+    jacobian: _Array
+
+class _ProjectMomenta(NamedTuple):
+    v: _Array
+    freed: _Array
+    sigma: _Array
+
+class _PositionCorrection(NamedTuple):
+    residual: _Array
+    dq: _Array
+    pivots: _Array
+
+class _Gaps(NamedTuple):
+    gaps: _Array
+    velocities: _Array
+    jacobian: _Array
+
+class Model:
+    @property
+    def name(self) -> str: ...
+    @property
+    def findings(self) -> List[Finding]: ...
+    @property
+    def nq(self) -> int: ...
+    @property
+    def nv(self) -> int: ...
+    @property
+    def coordinate_names(self) -> List[str]: ...
+    @property
+    def velocity_names(self) -> List[str]: ...
+    @property
+    def body_names(self) -> List[str]: ...
+    @property
+    def joint_names(self) -> List[str]: ...
+    @property
+    def frame_names(self) -> List[str]: ...
+    @property
+    def parameter_names(self) -> List[str]: ...
+    @property
+    def parameter_defaults(self) -> _Array: ...
+    @property
+    def wrench_names(self) -> List[str]: ...
+    @property
+    def constraint_names(self) -> List[str]: ...
+    @property
+    def contact_names(self) -> List[str]: ...
+    @property
+    def joint_ranges(self) -> _Array: ...
+    @property
+    def max_velocity(self) -> _Array: ...
+    @property
+    def max_effort(self) -> _Array: ...
+    @property
+    def outputs(self) -> List[str]: ...
+    def neutral(self) -> _Array: ...
+    def start(self) -> Tuple[_Array, _Array]: ...
+    def close(self, q: ArrayLike) -> _Array: ...
+    def shapes(self, output: str) -> Dict[str, Tuple[int, ...]]: ...
+    def generate(
+        self,
+        lang: Literal["rust", "c", "wasm", "wasm-lanes"] = ...,
+        outputs: Optional[Sequence[str]] = ...,
+        *,
+        name: Optional[str] = ...,
+        scalar: Literal["f64", "f32"] = ...,
+        frames: Optional[Sequence[str]] = ...,
+    ) -> Dict[str, Union[str, bytes]]: ...
+    def rollout(
+        self,
+        x0: Union[ArrayLike, Tuple[ArrayLike, ArrayLike]],
+        u: Optional[ArrayLike] = ...,
+        *,
+        dt: float,
+        steps: Optional[int] = ...,
+        method: Optional[str] = ...,
+        tolerance: Optional[float] = ...,
+        state: Literal["velocities", "momenta"] = ...,
+        layout: Literal["mbd", "pinocchio", "mujoco"] = ...,
+        every: int = ...,
+        params: Optional[_Params] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        threads: Optional[int] = ...,
+        out: Optional[Tuple[_Array, _Array]] = ...,
+        on_error: Literal["raise", "mark"] = ...,
+    ) -> Rollout: ...
+    def evaluate(self, output: str, *args: ArrayLike, out: Any = ..., **inputs: Any) -> Any: ...
+    def rates(
+        self,
+        q: ArrayLike,
+        p: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[Tuple[_Array, ...]] = ...,
+    ) -> _Rates: ...
+    def velocities(
+        self,
+        q: ArrayLike,
+        p: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[_Array] = ...,
+    ) -> _Array: ...
+    def momenta(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[_Array] = ...,
+    ) -> _Array: ...
+    def energy(
+        self,
+        q: ArrayLike,
+        p: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[_Array] = ...,
+    ) -> _Array: ...
+    def accelerations(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[_Array] = ...,
+    ) -> _Array: ...
+    def reactions(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[_Array] = ...,
+    ) -> _Array: ...
+    def mass_matrix(
+        self,
+        q: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[_Array] = ...,
+    ) -> _Array: ...
+    def frames(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[Tuple[_Array, ...]] = ...,
+    ) -> _Frames: ...
+    def inverse_dynamics(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[_Array] = ...,
+    ) -> _Array: ...
+    def bias(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[_Array] = ...,
+    ) -> _Array: ...
+    def regressor(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[_Array] = ...,
+    ) -> _Array: ...
+    def jacobians(
+        self,
+        q: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[_Array] = ...,
+    ) -> _Array: ...
+    def bias_accelerations(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[_Array] = ...,
+    ) -> _Array: ...
+    def centroidal(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[Tuple[_Array, ...]] = ...,
+    ) -> _Centroidal: ...
+    def derivatives(
+        self,
+        q: ArrayLike,
+        p: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[Tuple[_Array, ...]] = ...,
+    ) -> _Derivatives: ...
+    def momentum_derivatives(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[Tuple[_Array, ...]] = ...,
+    ) -> _MomentumDerivatives: ...
+    def parameter_derivatives(
+        self,
+        q: ArrayLike,
+        p: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[Tuple[_Array, ...]] = ...,
+    ) -> _ParameterDerivatives: ...
+    def constraint_residuals(
+        self,
+        q: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[Tuple[_Array, ...]] = ...,
+    ) -> _ConstraintResiduals: ...
+    def project_momenta(
+        self,
+        q: ArrayLike,
+        p: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[Tuple[_Array, ...]] = ...,
+    ) -> _ProjectMomenta: ...
+    def position_correction(
+        self,
+        q: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[Tuple[_Array, ...]] = ...,
+    ) -> _PositionCorrection: ...
+    def multipliers(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[_Array] = ...,
+    ) -> _Array: ...
+    def gaps(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        *,
+        tau: Optional[ArrayLike] = ...,
+        drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        drive_a: Optional[ArrayLike] = ...,
+        wrenches: Optional[ArrayLike] = ...,
+        gravity: Optional[ArrayLike] = ...,
+        params: Optional[_Params] = ...,
+        out: Optional[Tuple[_Array, ...]] = ...,
+    ) -> _Gaps: ...

@@ -1,0 +1,63 @@
+"""Types that the native part makes: findings and exceptions."""
+
+from __future__ import annotations
+
+from typing import Any, Dict, List, NamedTuple
+
+
+class Finding(NamedTuple):
+    """What is to be said about a place of a description.
+
+    ``severity`` is ``"error"``, ``"warning"`` or ``"notice"``. Lines and columns count from 1; 0 is the file as a whole.
+    """
+
+    severity: str
+    file: str
+    line: int
+    column: int
+    message: str
+    help: str
+
+    def __str__(self) -> str:
+        place = f"{self.file}:{self.line}:{self.column}" if self.line else self.file
+        help = f"\n  help: {self.help}" if self.help else ""
+        return f"{place}: {self.severity}: {self.message}{help}"
+
+
+class ModelError(ValueError):
+    """A description that cannot be used, or something that its model does not have.
+
+    ``findings`` lists everything that was found in the description; it is empty for errors about the model as a whole.
+    """
+
+    findings: List[Finding]
+
+    def __init__(self, message: str, findings: "List[Finding] | None" = None) -> None:
+        super().__init__(message)
+        self.findings = list(findings or [])
+
+    def __reduce__(self) -> Any:
+        return (type(self), (str(self), self.findings))
+
+
+class SimulationError(RuntimeError):
+    """A motion that did not reach its end.
+
+    ``kind`` is a word (``"not_finite"``, ``"quaternion"``, ``"step_too_small"``, ``"no_convergence"``, ``"constraint"``, ...),
+    ``time`` the start of the step that failed, s, ``row`` the row of the batch, ``numbers`` what belongs to the kind, by name.
+    """
+
+    kind: str
+    time: float
+    row: int
+    numbers: Dict[str, float]
+
+    def __init__(self, message: str, kind: str, time: float, row: int, numbers: Dict[str, float]) -> None:
+        super().__init__(message)
+        self.kind = kind
+        self.time = time
+        self.row = row
+        self.numbers = numbers
+
+    def __reduce__(self) -> Any:
+        return (type(self), (str(self), self.kind, self.time, self.row, self.numbers))

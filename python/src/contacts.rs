@@ -1,0 +1,170 @@
+//! Motions with contacts.
+
+use multibody::codegen::jit::{CompileError, Compiled};
+use multibody::codegen::options::Arithmetic;
+use multibody::codegen::output::FIELDS;
+use multibody::codegen::plan::Plan;
+use multibody::codegen::Options;
+use multibody::runtime::constrained::{Effort, Projection, Stabilisation, WithPostStep};
+use multibody::runtime::contact::{
+    Contact, ContactMotion, HybridError, ModeTable, RegimeChoice, RegimeRules, WithContacts,
+};
+use multibody::runtime::integrate::{Dop853, Rk4, Step, StepError, Stepper, Tolerances};
+
+use crate::errors::Failed;
+use crate::machines::set;
+use crate::rollout::{Item, Motion, Settings};
+use crate::rows::Beat;
+
+type System = WithContacts<ModeTable<Compiled>>;
+type Method = WithPostStep<System, Box<dyn Stepper<System>>, Projection<System>>;
+
+/// Longest time step where events crowd, s.
+const LONGEST: f64 = 1e-3;
+/// Steps of the method between two rows of the result.
+const MOST_STEPS: u64 = 1_000_000;
+
+/// The methods that follow contacts: their names.
+pub const METHODS: [&str; 2] = ["rk4", "dop853"];
+
+/// A mechanism with contacts. Its arithmetic is exact, so that machine code and the interpreter give the same bits, however
+/// often modes were visited before.
+#[derive(Clone)]
+pub struct Touching {
+    full: Compiled,
+    contacts: Vec<Contact<f64>>,
+    /// With the parameters at their defaults, and the sets of modes that were visited so far.
+    table: ModeTable<Compiled>,
+}
+
+impl Touching {
+    /// Of a plan without contacts.
+    pub fn new(plan: &Plan, options: &Options, gravity: [f64; 3]) -> Result<Touching, CompileError> {
+        let options = Options { arithmetic: Arithmetic::Exact, ..options.clone() }.of_model(true);
+        let full = Compiled::from_plan(plan.with_contacts(), options)?;
+        let mut full = full.compiled_after(Compiled::<f64>::WORTHWHILE);
+        full.inputs().gravity = gravity;
+        let contacts = plan.contacts();
+        let mut table = ModeTable::new(full.clone(), contacts.clone());
+        table.inputs().gravity = gravity;
+        Ok(Touching { full, contacts, table })
+    }
+}
+
+/// The method of the settings, with what closes loops and contacts.
+fn method(settings: &Settings, system: &System) -> (Method, Projection<System>, Step) {
+    let method: Box<dyn Stepper<System>> = match &settings.method[..] {
+        "dop853" => Box::new(Dop853::new(system)),
+        _ => Box::new(Rk4::new(system)),
+    };
+    let effort = Effort { energy: f64::INFINITY, ..Effort::default() };
+    let hold = || Projection::new(system, Stabilisation::default(), effort);
+    let fixed = Step::Fixed(settings.dt);
+    let step = settings.tolerance.map_or(fixed, |tolerance| Step::Adaptive(Tolerances::new(tolerance)));
+    (WithPostStep::new(system, method, hold()), hold(), step)
+}
+
+/// Index of the parameters among the fields.
+fn params() -> Option<usize> {
+    FIELDS.iter().position(|field| field.array.name == "params")
+}
+
+impl Motion<'_> {
+    fn has_params(&self) -> bool {
+        self.fields.iter().any(|(field, _)| Some(*field) == params())
+    }
+
+    /// The mechanism with the inputs of row `k`.
+    fn table(&self, touching: &Touching, k: usize) -> ModeTable<Compiled> {
+        let (own, others): (Vec<_>, Vec<_>) = self.fields.iter().partition(|(field, _)| Some(*field) == params());
+        let mut table = match own.first() {
+            None => touching.table.clone(),
+            Some((field, rows)) => {
+                let mut full = touching.full.clone();
+                set(&mut full, *field, rows.row(k));
+                ModeTable::new(full, touching.contacts.clone())
+            }
+        };
+        others.iter().for_each(|(field, rows)| set(&mut table, *field, rows.row(k)));
+        table.inputs().tau.fill(0.0);
+        table
+    }
+
+    /// Sets the joint forces of a step of row `k`.
+    fn drive(&self, k: usize, step: usize, q: &[f64], system: &mut System) {
+        let Some(u) = self.u else { return };
+        let u = &u.row(k)[step * self.sizes.1..(step + 1) * self.sizes.1];
+        let tau = &mut system.system_mut().inputs().tau;
+        match self.layout {
+            None => tau.copy_from_slice(u),
+            Some(layout) => layout.v_from(q, u, tau),
+        }
+    }
+
+    /// Computes a row of a model with contacts, as [`Motion::row`](crate::rollout) does without.
+    pub fn row_with_contacts(
+        &self,
+        machine: &mut Compiled,
+        touching: &mut Touching,
+        (k, q, v): &mut Item,
+        written: &mut usize,
+        beat: &mut Beat,
+    ) -> Result<(), Failed> {
+        let mut state = self.begin(machine, *k)?;
+        let mut system = WithContacts::new(self.table(touching, *k));
+        let (method, close, step) = method(self.settings, &system);
+        let rules = RegimeRules::new(RegimeChoice::Automatic, self.settings.dt.min(LONGEST));
+        if self.settings.steps > 0 {
+            self.drive(*k, 0, &state.q, &mut system);
+        }
+        let motion = ContactMotion::new(&mut system, (method, step), close, rules, 0.0, (&state.q, &state.p));
+        let mut motion = motion.map_err(|error| failed(&error))?;
+        let (nq, nv) = self.sizes;
+        for step in 0..=self.settings.steps {
+            if step.is_multiple_of(self.settings.every) {
+                let at = *written;
+                let (q, v) = (&mut q[at * nq..(at + 1) * nq], &mut v[at * nv..(at + 1) * nv]);
+                self.store(system.system_mut(), &mut state, q, v);
+                *written += 1;
+            }
+            if step == self.settings.steps {
+                break;
+            }
+            if step > 0 && self.u.is_some() {
+                self.drive(*k, step, &state.q, &mut system);
+                motion.resume(&mut system).map_err(|error| failed(&error))?;
+            }
+            let (end, mut left) = ((step + 1) as f64 * self.settings.dt, MOST_STEPS);
+            while motion.time() < end {
+                if left == 0 {
+                    let error = StepError::TooManySteps { time: motion.time(), steps: MOST_STEPS };
+                    return Err(failed(&error.into()));
+                }
+                left -= 1;
+                motion.advance(&mut system, end, &mut ()).map_err(|error| failed(&error))?;
+                if !beat.goes_on() {
+                    return Ok(());
+                }
+            }
+            motion.state(&system, &mut state.q, &mut state.p);
+        }
+        if !self.has_params() {
+            touching.table = system.system().clone();
+        }
+        Ok(())
+    }
+}
+
+fn failed(error: &HybridError) -> Failed {
+    let words = error.to_string();
+    let (kind, time, numbers) = match *error {
+        HybridError::Step(error) => return Failed::step(&error, words),
+        HybridError::Overlap { contact, gap } => ("overlap", 0.0, vec![("contact", contact as f64), ("gap", gap)]),
+        HybridError::Contact { time, .. } => ("contact", time, vec![]),
+        HybridError::TooManyEvents { time, events } => ("too_many_events", time, vec![("events", events.into())]),
+        HybridError::TurnsTooFar { time, angle } => ("turns_too_far", time, vec![("angle", angle)]),
+        HybridError::NotFinite { time } => ("not_finite", time, vec![]),
+        _ => ("failed", 0.0, vec![]),
+    };
+    Failed { kind, message: words, time, numbers }
+}

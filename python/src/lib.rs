@@ -1,0 +1,87 @@
+//! The native part of the Python package `multibody`: classes and functions over `mbd-codegen` and `mbd-runtime`. Nothing
+//! of mechanics is computed here.
+
+mod arrays;
+mod contacts;
+mod driver;
+mod errors;
+mod evaluate;
+mod generate;
+mod machines;
+mod model;
+mod pairs;
+mod read;
+mod rollout;
+mod rows;
+
+use std::path::PathBuf;
+
+use multibody::codegen::output::{Dim, Output};
+use multibody::runtime::catalogue;
+use pyo3::prelude::*;
+use pyo3::types::PyList;
+
+/// Findings about a description.
+#[pyfunction]
+#[pyo3(signature = (path = None, *, text = None, format = "toml", base = "fixed", gravity = None, limits = false, floor = None))]
+fn check<'py>(
+    py: Python<'py>,
+    path: Option<PathBuf>,
+    text: Option<String>,
+    format: &str,
+    base: &str,
+    gravity: Option<[f64; 3]>,
+    limits: bool,
+    floor: Option<(f64, f64)>,
+) -> PyResult<Bound<'py, PyList>> {
+    read::check(py, &read::source(path, text, format)?, &read::options(base, gravity, limits, floor)?)
+}
+
+/// A description as one of the TOML format.
+#[pyfunction]
+#[pyo3(signature = (path = None, *, text = None, format = "toml", base = "fixed", gravity = None, limits = false))]
+fn convert(
+    py: Python<'_>,
+    path: Option<PathBuf>,
+    text: Option<String>,
+    format: &str,
+    base: &str,
+    gravity: Option<[f64; 3]>,
+    limits: bool,
+) -> PyResult<String> {
+    read::convert(py, &read::source(path, text, format)?, &read::options(base, gravity, limits, None)?)
+}
+
+/// Name, arguments, results and documentation of an output.
+type Row = (&'static str, Vec<(&'static str, String)>, Vec<(&'static str, String)>, String);
+
+/// The table of outputs.
+#[pyfunction]
+fn outputs() -> Vec<Row> {
+    let arrays = |arrays: &[multibody::codegen::output::Array]| {
+        let text = |dims: &[Dim]| dims.iter().map(|dim| dim.text()).collect::<Vec<_>>().join(", ");
+        arrays.iter().map(|array| (array.name, text(array.dims))).collect()
+    };
+    let row = |output: &Output| {
+        let spec = output.spec();
+        (spec.name, arrays(spec.inputs), arrays(spec.results), spec.doc().collect::<Vec<_>>().join("\n"))
+    };
+    Output::ALL.iter().map(row).collect()
+}
+
+/// The methods of integration: name, title, whether they can choose their steps.
+#[pyfunction]
+fn methods() -> Vec<(&'static str, &'static str, bool)> {
+    catalogue::entries().map(|entry| (entry.name, entry.title, entry.adaptive)).collect()
+}
+
+/// The native part of the package.
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<model::Model>()?;
+    module.add_function(wrap_pyfunction!(model::load, module)?)?;
+    module.add_function(wrap_pyfunction!(check, module)?)?;
+    module.add_function(wrap_pyfunction!(convert, module)?)?;
+    module.add_function(wrap_pyfunction!(outputs, module)?)?;
+    module.add_function(wrap_pyfunction!(methods, module)?)
+}

@@ -1,0 +1,85 @@
+//! Reading, checking and converting descriptions.
+
+use std::path::PathBuf;
+
+use multibody::codegen::diag::Diagnostics;
+use multibody::codegen::model::{Model, Wrench, WrenchAxes};
+use multibody::codegen::read::{self, Base, Floor, ImportOptions};
+use multibody::codegen::words;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyList;
+
+use crate::errors::{about_model, findings, model_error, unreadable};
+
+/// A text and the name of its file.
+pub struct Source {
+    file: String,
+    text: String,
+}
+
+/// The text of a file, or one that is given with its format.
+pub fn source(path: Option<PathBuf>, text: Option<String>, format: &str) -> PyResult<Source> {
+    match (path, text) {
+        (Some(path), None) => {
+            let bytes = read::read_bytes(&path).map_err(|error| unreadable(&path, &error))?;
+            let wrong = |_| std::io::Error::new(std::io::ErrorKind::InvalidData, "it is not UTF-8 text");
+            let text = String::from_utf8(bytes).map_err(wrong).map_err(|error| unreadable(&path, &error))?;
+            Ok(Source { file: path.display().to_string(), text })
+        }
+        (None, Some(text)) => Ok(Source { file: format!("text.{format}"), text }),
+        _ => Err(PyValueError::new_err("give either a path or `text=`")),
+    }
+}
+
+/// Import options from their words.
+pub fn options(
+    base: &str,
+    gravity: Option<[f64; 3]>,
+    limits: bool,
+    floor: Option<(f64, f64)>,
+) -> PyResult<ImportOptions> {
+    let Some(base) = Base::from_name(base) else {
+        let names = Base::ALL.map(Base::name);
+        return Err(PyValueError::new_err(format!("no base is called `{base}`: take one of {}", names.join(", "))));
+    };
+    let floor = floor.map(|(height, friction)| Floor { height, friction });
+    Ok(ImportOptions { base, gravity, limits, floor })
+}
+
+/// Reads a model, with the wrenches that are asked for by the names of bodies.
+pub fn model(
+    py: Python<'_>,
+    source: &Source,
+    options: &ImportOptions,
+    variant: Option<&str>,
+    wrenches: &[String],
+) -> PyResult<(Model, Diagnostics)> {
+    let read = || read::load_variant(&source.file, &source.text, options, &read::read_bytes, variant);
+    let (model, found) = py.detach(read);
+    let Some(mut model) = model else { return Err(model_error(py, &found)) };
+    for name in wrenches {
+        let names = model.bodies.iter().map(|b| b.name.as_str());
+        let Some(body) = model.bodies.iter().position(|b| b.name == *name) else {
+            let help = words::did_you_mean(name, names.clone(), || format!("bodies are {}", words::list(names)));
+            return Err(about_model(py, &format!("wrenches: no body is named {}: {help}", words::quote(name))));
+        };
+        if model.wrenches.iter().any(|w| w.name == *name) {
+            return Err(about_model(py, &format!("wrenches: there is one named {} already", words::quote(name))));
+        }
+        model.wrenches.push(Wrench { name: name.clone(), body, axes: WrenchAxes::Body });
+    }
+    Ok((model, found))
+}
+
+/// All findings about a description.
+pub fn check<'py>(py: Python<'py>, source: &Source, options: &ImportOptions) -> PyResult<Bound<'py, PyList>> {
+    let (_, found) = py.detach(|| read::load_with(&source.file, &source.text, options, &read::read_bytes));
+    findings(py, &found.0)
+}
+
+/// A description as one of the TOML format.
+pub fn convert(py: Python<'_>, source: &Source, options: &ImportOptions) -> PyResult<String> {
+    let converted = py.detach(|| read::to_toml(&source.file, &source.text, options, &read::read_bytes));
+    converted.map(|(text, _)| text).map_err(|found| model_error(py, &found))
+}

@@ -1,0 +1,378 @@
+//! Motions of many rows: arguments, results, and one row.
+
+use std::sync::{Mutex, PoisonError};
+
+use multibody::codegen::jit::{Compiled, CompiledLanes, LANES};
+use multibody::codegen::output::Output;
+use multibody::codegen::plan::state_layout;
+use multibody::runtime::catalogue;
+use multibody::runtime::integrate::StepError;
+use multibody::runtime::layout::Layout;
+use multibody::runtime::{Conjugate, Constrained, System};
+use numpy::PyArrayDyn;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::arrays::{result, writable, Given, Rows};
+use crate::contacts::{self, Touching};
+use crate::driver::Driver;
+use crate::errors::{compile_error, Failed};
+use crate::machines::{set, Inputs, Machines};
+use crate::model::Model;
+use crate::pairs;
+use crate::rows::{on_threads, Beat};
+
+/// Residual up to which the loops of a start count as closed, m or rad.
+const OPEN: f64 = 1e-6;
+
+/// Coordinates, velocities or momenta, failures.
+pub type Results<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyList>);
+
+/// How motions are computed; a dictionary of Python.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Settings {
+    pub dt: f64,
+    pub steps: usize,
+    pub every: usize,
+    pub method: String,
+    pub tolerance: Option<f64>,
+    pub momenta: bool,
+    layout: String,
+    threads: Option<usize>,
+}
+
+impl Settings {
+    /// Refuses what cannot be computed.
+    fn check(&self) -> PyResult<()> {
+        let refuse = |words: String| Err(PyValueError::new_err(words));
+        let Some(entry) = catalogue::entry(&self.method) else {
+            let names: Vec<&str> = catalogue::entries().map(|entry| entry.name).collect();
+            return refuse(format!("no method is called `{}`: take one of {}", self.method, names.join(", ")));
+        };
+        if !(self.dt > 0.0 && self.dt.is_finite()) {
+            return refuse(format!("`dt` is {}: give a step in s, greater than zero", self.dt));
+        }
+        if !self.steps.is_multiple_of(self.every) || self.every == 0 {
+            return refuse(format!("`every` is {}, which does not divide {} steps", self.every, self.steps));
+        }
+        if self.threads == Some(0) {
+            return refuse("`threads` is 0: give at least one, or None for one on each core".into());
+        }
+        match self.tolerance {
+            Some(tolerance) if !(tolerance > 0.0 && tolerance < 1.0) => {
+                refuse(format!("`tolerance` is {tolerance}: give a number between 0 and 1"))
+            }
+            Some(_) if !entry.adaptive => {
+                let names: Vec<&str> = catalogue::entries().filter(|e| e.adaptive).map(|e| e.name).collect();
+                let (method, names) = (&self.method, names.join(", "));
+                refuse(format!("`{method}` has fixed steps: leave `tolerance` out, or take one of {names}"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn layout(&self, model: &Model) -> PyResult<Option<Layout>> {
+        match &self.layout[..] {
+            "mbd" => Ok(None),
+            "pinocchio" => Ok(Some(state_layout::pinocchio(&model.plan))),
+            "mujoco" => Ok(Some(state_layout::mujoco(&model.plan))),
+            other => {
+                let words = format!("no layout is called `{other}`: take mbd, pinocchio or mujoco");
+                Err(PyValueError::new_err(words))
+            }
+        }
+    }
+}
+
+/// Motions of all rows.
+pub fn rollout<'py>(
+    py: Python<'py>,
+    model: &Model,
+    start: (Bound<'py, PyAny>, Bound<'py, PyAny>),
+    u: Option<Bound<'py, PyAny>>,
+    settings: Settings,
+    inputs: Option<&Bound<'py, PyDict>>,
+    out: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
+) -> PyResult<Results<'py>> {
+    settings.check()?;
+    let touches = !model.description.contacts.is_empty();
+    if touches && !contacts::METHODS.contains(&&settings.method[..]) {
+        let (method, names) = (&settings.method, contacts::METHODS.join(" or "));
+        return Err(PyValueError::new_err(format!(
+            "`{method}` does not follow the contacts of the model: take {names}"
+        )));
+    }
+    let (layout, machines) = (settings.layout(model)?, model.machines(py)?);
+    for output in [Output::Rates, Output::Velocities, Output::Momenta] {
+        machines.prepare(py, output).map_err(|e| compile_error(py, &e))?;
+    }
+    let touching = match touches {
+        true => Some(py.detach(|| machines.touching()).map_err(|e| compile_error(py, &e))?),
+        false => None,
+    };
+    let dims = model.plan.dims;
+    let (nq, nv) = layout.as_ref().map_or((dims.nq, dims.nv), Layout::sizes);
+    let second = if settings.momenta { "p0" } else { "v0" };
+    let q0 = Given::read(&start.0, "q0", &[nq])?;
+    let v0 = Given::read(&start.1, second, &[nv])?;
+    let u = u.map(|u| Given::read(&u, "u", &[settings.steps, nv])).transpose()?;
+    let inputs = Inputs::read(inputs, &machines.sizes())?;
+    let batch = inputs.batch([Some(&q0), Some(&v0), u.as_ref()].into_iter().flatten())?;
+    let count = (settings.steps / settings.every).saturating_add(1);
+    let shape = |n: usize| -> Vec<usize> { batch.into_iter().chain([count, n]).collect() };
+    let (q_out, v_out) = (out.as_ref().map(|out| &out.0), out.as_ref().map(|out| &out.1));
+    let (q, v) = (result(py, q_out, "q", &shape(nq))?, result(py, v_out, "v", &shape(nv))?);
+    let failures = {
+        let (mut q_lock, mut v_lock) = (writable(&q, "q")?, writable(&v, "v")?);
+        let (q_all, v_all) = (q_lock.as_slice_mut()?, v_lock.as_slice_mut()?);
+        let fields = inputs.0.iter().map(|(field, given)| Ok((*field, given.rows()?))).collect::<PyResult<Vec<_>>>()?;
+        let motion = Motion {
+            settings: &settings,
+            layout: layout.as_ref(),
+            sizes: (nq, nv),
+            start: (q0.rows()?, v0.rows()?),
+            u: u.as_ref().map(Given::rows).transpose()?,
+            fields,
+            touching,
+        };
+        motion.all(py, machines, batch.unwrap_or(1), (q_all, v_all))?
+    };
+    let list = PyList::empty(py);
+    for (row, failed) in failures {
+        list.append(failed.object(py, row)?)?;
+    }
+    Ok((q, v, list))
+}
+
+/// What all rows have in common.
+pub struct Motion<'a> {
+    pub settings: &'a Settings,
+    pub layout: Option<&'a Layout>,
+    /// Numbers of coordinates and velocities there.
+    pub sizes: (usize, usize),
+    start: (Rows<'a>, Rows<'a>),
+    pub u: Option<Rows<'a>>,
+    pub fields: Vec<(usize, Rows<'a>)>,
+    /// For models with contacts.
+    touching: Option<Touching>,
+}
+
+/// The state of a row, and memory.
+pub struct State {
+    pub q: Vec<f64>,
+    pub p: Vec<f64>,
+    pub v: Vec<f64>,
+}
+
+/// What a thread works with.
+struct Memory {
+    machine: Compiled,
+    lanes: Option<CompiledLanes>,
+    touching: Option<Touching>,
+}
+
+/// A row and the memory of its results.
+pub type Item<'a> = (usize, &'a mut [f64], &'a mut [f64]);
+
+impl Motion<'_> {
+    /// Computes all rows; returns the failures, in the order of the rows.
+    fn all(
+        &self,
+        py: Python<'_>,
+        machines: &Machines,
+        rows: usize,
+        (q, v): (&mut [f64], &mut [f64]),
+    ) -> PyResult<Vec<(usize, Failed)>> {
+        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let lanes = match self.at_once(machines, rows) {
+            true => py.detach(|| machines.lanes()),
+            false => None,
+        };
+        let width = if lanes.is_some() { LANES } else { 1 };
+        let threads = self.settings.threads.unwrap_or_else(cores).min(rows.div_ceil(width)).max(1);
+        let failures = Mutex::new(Vec::new());
+        py.detach(|| {
+            let mut items = cut(q, rows).zip(cut(v, rows)).enumerate().map(|(k, (q, v))| (k, q, v));
+            let blocks = std::iter::from_fn(|| {
+                let block: Vec<Item> = items.by_ref().take(width).collect();
+                (!block.is_empty()).then_some(block)
+            });
+            let begin = || Memory { machine: machines.take(), lanes: lanes.clone(), touching: self.touching.clone() };
+            let end = |memory: Memory| {
+                machines.give_back(memory.machine, self.fields.iter().map(|(field, _)| *field));
+            };
+            on_threads(blocks, threads, begin, end, |memory, block: Vec<Item>, beat| {
+                for (k, failed) in self.block(memory, block, beat) {
+                    failures.lock().unwrap_or_else(PoisonError::into_inner).push((k, failed));
+                }
+            })
+        })?;
+        let mut failures = failures.into_inner().unwrap_or_else(PoisonError::into_inner);
+        failures.sort_by_key(|(k, _)| *k);
+        Ok(failures)
+    }
+
+    /// Whether rows can be computed several at once.
+    fn at_once(&self, machines: &Machines, rows: usize) -> bool {
+        let Settings { method, tolerance, .. } = self.settings;
+        rows >= LANES && self.touching.is_none() && machines.sizes().rows == 0 && pairs::possible(method, *tolerance)
+    }
+
+    /// Computes some rows, at once if possible; returns those that fail.
+    fn block(&self, memory: &mut Memory, block: Vec<Item>, beat: &mut Beat) -> Vec<(usize, Failed)> {
+        let left = match (&mut memory.lanes, <[Item; LANES]>::try_from(block)) {
+            (Some(lanes), Ok(mut items)) => {
+                if self.rows_at_once((&mut memory.machine, lanes), &mut items, beat).is_some() {
+                    return Vec::new();
+                }
+                items.into()
+            }
+            (_, Ok(items)) => items.into(),
+            (_, Err(block)) => block,
+        };
+        let one = |item: Item| (item.0, self.row(memory, item, beat));
+        left.into_iter().map(one).filter_map(|(k, done)| Some((k, done.err()?))).collect()
+    }
+
+    /// Refuses quaternions that are not of unit length.
+    pub fn check_units(&self, machine: &Compiled, q: &[f64]) -> Result<(), StepError> {
+        for index in machine.quaternions() {
+            let norm = q[index..index + 4].iter().map(|x| x * x).sum::<f64>();
+            // Those near the limit are judged by the method itself.
+            if !(0.999..1.001).contains(&norm) {
+                return Err(StepError::Quaternion { time: 0.0, index, norm: norm.sqrt() });
+            }
+        }
+        Ok(())
+    }
+
+    /// Computes one row. After a failure the rest of it is not a number.
+    fn row(&self, memory: &mut Memory, mut item: Item, beat: &mut Beat) -> Result<(), Failed> {
+        let Memory { machine, touching, .. } = memory;
+        self.fields.iter().for_each(|(field, rows)| set(machine, *field, rows.row(item.0)));
+        machine.inputs().tau.fill(0.0);
+        let mut written = 0;
+        let done = match touching {
+            Some(touching) => self.row_with_contacts(machine, touching, &mut item, &mut written, beat),
+            None => self.motion(machine, &mut item, &mut written, beat),
+        };
+        let (_, q, v) = item;
+        let (nq, nv) = self.sizes;
+        if written * nq < q.len() {
+            q[written * nq..].fill(f64::NAN);
+            v[written * nv..].fill(f64::NAN);
+        }
+        done
+    }
+
+    fn motion(
+        &self,
+        machine: &mut Compiled,
+        (k, q, v): &mut Item,
+        written: &mut usize,
+        beat: &mut Beat,
+    ) -> Result<(), Failed> {
+        let mut state = self.begin(machine, *k)?;
+        let mut driver = Driver::new(self.settings, machine, &state).map_err(|e| failed(machine, &e))?;
+        let u = self.u.map(|u| u.row(*k));
+        let (nq, nv) = self.sizes;
+        for step in 0..=self.settings.steps {
+            if step.is_multiple_of(self.settings.every) {
+                let at = *written;
+                self.store(machine, &mut state, &mut q[at * nq..(at + 1) * nq], &mut v[at * nv..(at + 1) * nv]);
+                *written += 1;
+            }
+            if step == self.settings.steps {
+                break;
+            }
+            if let Some(u) = u {
+                let u = &u[step * nv..(step + 1) * nv];
+                let tau = &mut machine.inputs().tau;
+                match self.layout {
+                    None => tau.copy_from_slice(u),
+                    Some(layout) => layout.v_from(&state.q, u, tau),
+                }
+            }
+            let go_on = driver.step(self.settings, machine, step, u.is_some(), &mut state, beat);
+            if !go_on.map_err(|e| failed(machine, &e))? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The state at the start of a row.
+    pub fn begin(&self, machine: &mut Compiled, k: usize) -> Result<State, Failed> {
+        let (q_there, v_there) = (self.start.0.row(k), self.start.1.row(k));
+        let (mut q, mut second) = (machine.neutral(), machine.zero_momenta());
+        match self.layout {
+            None => {
+                q.copy_from_slice(q_there);
+                second.copy_from_slice(v_there);
+            }
+            Some(layout) => {
+                layout.q_from(q_there, &mut q);
+                layout.v_from(&q, v_there, &mut second);
+            }
+        }
+        if let Some(index) = q.iter().chain(&second).position(|x| !x.is_finite()) {
+            let words = format!("number {index} of the start is not finite");
+            return Err(Failed::start("not_finite", words, vec![("index", index as f64)]));
+        }
+        let mut p = second.clone();
+        if !self.settings.momenta {
+            machine.conjugate_momenta(&q, &second, &mut p);
+        }
+        if !machine.rows().is_empty() {
+            closed(machine, &q)?;
+            let mut sigma = machine.zero_rows();
+            machine.project_momenta(0.0, &q, &mut p, &mut second, &mut sigma);
+        }
+        Ok(State { q, p, v: second })
+    }
+
+    /// Writes the state as a row of the result.
+    pub fn store(&self, machine: &mut Compiled, state: &mut State, q: &mut [f64], v: &mut [f64]) {
+        if !self.settings.momenta {
+            machine.velocities(&state.q, &state.p, &mut state.v);
+        }
+        let second = if self.settings.momenta { &state.p } else { &state.v };
+        match self.layout {
+            None => {
+                q.copy_from_slice(&state.q);
+                v.copy_from_slice(second);
+            }
+            Some(layout) => {
+                layout.q_to(&state.q, q);
+                layout.v_to(&state.q, second, v);
+            }
+        }
+    }
+}
+
+/// Memory in as many equal parts.
+fn cut(mut all: &mut [f64], parts: usize) -> impl Iterator<Item = &mut [f64]> + Send {
+    let len = all.len() / parts.max(1);
+    (0..parts).map(move |_| {
+        let (part, rest) = std::mem::take(&mut all).split_at_mut(len);
+        all = rest;
+        part
+    })
+}
+
+/// Refuses a start whose loops are open.
+fn closed(machine: &mut Compiled, q: &Vec<f64>) -> Result<(), Failed> {
+    let (mut residual, mut entries) = (machine.zero_rows(), machine.zero_entries());
+    machine.constraint_residuals(q, &mut residual, &mut entries);
+    let rows = machine.rows().iter().zip(&residual).filter(|(row, _)| row.holonomic);
+    let worst = rows.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+    let Some((row, worst)) = worst.filter(|(_, worst)| worst.abs() > OPEN) else { return Ok(()) };
+    let words = format!("the start leaves the loops open by {:.1e} (m or rad): take model.close(q0)", worst.abs());
+    Err(Failed::start("open", words, vec![("constraint", row.constraint as f64), ("residual", worst.abs())]))
+}
+
+fn failed(machine: &Compiled, error: &StepError) -> Failed {
+    Failed::step(error, error.named(machine).to_string())
+}

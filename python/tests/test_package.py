@@ -1,0 +1,103 @@
+"""The stubs, the documentation, the environments."""
+
+import importlib.util
+import inspect
+import pathlib
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from conftest import MODELS, REPOSITORY
+
+import multibody
+import multibody.gym
+
+PACKAGE = pathlib.Path(multibody.__file__).parent
+
+
+def public(of):
+    return [name for name in dir(of) if not name.startswith("_")]
+
+
+def test_every_public_name_is_documented_and_in_the_stubs():
+    stub = (PACKAGE / "__init__.pyi").read_text()
+    for name in multibody.__all__:
+        assert inspect.getdoc(getattr(multibody, name)), name
+        assert re.search(rf"^(def|class) {name}\b|^{name}:|import .*\b{name}\b", stub, re.M), name
+    inside = stub[stub.index("class Model") :]
+    for name in public(multibody.Model):
+        assert inspect.getdoc(getattr(multibody.Model, name)), name
+        assert re.search(rf"^    def {name}\(", inside, re.M), name
+    gym = (PACKAGE / "gym.pyi").read_text()
+    for name in multibody.gym.__all__:
+        assert inspect.getdoc(getattr(multibody.gym, name)), name
+        assert re.search(rf"^(def|class) {name}\b", gym, re.M), name
+    assert (PACKAGE / "py.typed").exists()
+
+
+def test_the_stubs_are_those_of_the_table():
+    specification = importlib.util.spec_from_file_location("make_stubs", REPOSITORY / "python" / "make_stubs.py")
+    make_stubs = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(make_stubs)
+    assert make_stubs.text() == (PACKAGE / "__init__.pyi").read_text()
+
+
+def test_outputs_are_methods_with_shapes_in_their_documentation():
+    for name, arguments, results, _ in multibody.outputs():
+        method = getattr(multibody.Model, name)
+        assert list(inspect.signature(method).parameters)[1 : 1 + len(arguments)] == [a for a, _ in arguments]
+        assert all(f"``{r}``" in method.__doc__ for r, _ in results)
+
+
+def test_import_is_light():
+    code = "import sys, multibody; print([m for m in ('gymnasium', 'torch', 'mujoco') if m in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+
+
+def blocks():
+    page = REPOSITORY / "book" / "src" / "python.md"
+    return re.findall(r"^```python\n(.*?)^```", page.read_text(), re.M | re.S)
+
+
+def test_the_programs_of_the_book_run(monkeypatch):
+    monkeypatch.chdir(REPOSITORY)
+    names = {}
+    for block in blocks():
+        if "gymnasium" in block or "multibody.gym" in block:
+            pytest.importorskip("gymnasium")
+        exec(compile(block, "python.md", "exec"), names)  # noqa: S102
+
+
+def environment(**settings):
+    pendulum = multibody.load(MODELS / "double_pendulum.toml")
+    return pendulum, dict(reward=lambda s: -np.square(s.q).sum(axis=1), action_limit=2.0, **settings)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_gymnasium_accepts_the_environment():
+    pytest.importorskip("gymnasium")
+    from gymnasium.utils.env_checker import check_env
+
+    pendulum, settings = environment()
+    check_env(multibody.gym.make(pendulum, **settings), skip_render_check=True)
+
+
+def test_vectors_of_environments():
+    gymnasium = pytest.importorskip("gymnasium")
+    pendulum, settings = environment(max_episode_steps=3, terminated=lambda s: s.q[:, 0] > 1e9)
+    envs = multibody.gym.make_vec(pendulum, num_envs=4, **settings)
+    assert isinstance(envs, gymnasium.vector.VectorEnv) and envs.metadata["autoreset_mode"].value == "NextStep"
+    first, _ = envs.reset(seed=1)
+    again, _ = envs.reset(seed=1)
+    assert (first == again).all() and first.shape == (4, 4) and envs.observation_space.contains(first)
+    actions = np.ones((4, 2))
+    for k in range(3):
+        observations, rewards, terminated, truncated, _ = envs.step(actions)
+        assert not terminated.any() and (truncated == (k == 2)).all() and (rewards < 0).all()
+    observations, rewards, terminated, truncated, _ = envs.step(actions)
+    assert (rewards == 0).all() and not truncated.any() and abs(observations).max() <= 0.011
+    single = multibody.gym.make(pendulum, **settings)
+    single.reset(seed=1)
+    assert single.step(np.ones(2))[0].shape == (4,)
