@@ -1,7 +1,8 @@
 //! Outputs whose programs are too large to compile, by the interpreter.
 
-use mbd_runtime::sweep::{Derivatives, FrameState, MomentumDerivatives};
+use mbd_runtime::sweep::{Derivatives, FrameState};
 use mbd_runtime::system::{Constrained, Differentiable};
+use mbd_runtime::MomentumDerivatives;
 
 use super::memory::Number;
 use super::{CompileError, Compiled};

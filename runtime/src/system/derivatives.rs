@@ -68,8 +68,8 @@ impl<V: Zero, M: Zero> StateDerivatives<V, M> {
 /// coordinates and velocities.
 ///
 /// The output `momentum_derivatives` of generated code writes one: `V` is `[f64; NV]` and `M` is `[[f64; NV]; NV]`, by
-/// rows. With lanes, every number is an array of the lanes. Fields of arrays lie in memory in their order, without gaps. The sweeps and the interpreter have both in a `Vec`, matrices
-/// row by row.
+/// rows. With lanes, every number is an array of the lanes. Fields of arrays lie in memory in their order, without gaps.
+/// The sweeps and the interpreter have both in a `Vec`, matrices row by row.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C)]
 pub struct MomentumDerivatives<V, M> {
