@@ -32,7 +32,7 @@ pub fn known(path: &Path) -> Outcome {
     if is_parquet(path) && !cfg!(feature = "parquet") {
         return Err(Failure::new(
             format!("cannot write `{}`: this program was built without Parquet", path.display()),
-            "build it with `cargo install mbd-cli --features parquet`, or name a file that ends in .csv",
+            "build it with `cargo install --path cli --features parquet`, or name a file that ends in .csv",
         ));
     }
     Ok(())

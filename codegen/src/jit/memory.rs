@@ -2,8 +2,9 @@
 //!
 //! The only `unsafe` code of the generator is in this file. It is sound for these reasons:
 //! - A function is called only through [`MachineCode::call`], which compares the length of every slice with that of the
-//!   array of which the code was made, times the number of states that it computes at once. The code reads and writes at constant places inside these arrays, in tables that
-//!   the function owns, and in working memory whose length is compared too.
+//!   array of which the code was made, times the number of states that it computes at once. The code reads and writes at
+//!   constant places inside these arrays, in tables that the function owns, and in working memory whose length is
+//!   compared too.
 //! - Input slices are shared and result slices are exclusive references, so that the code's loads and stores do not
 //!   meet those of others.
 //! - The memory of the code lives as long as the function and is never changed after it was made, so that any number of
