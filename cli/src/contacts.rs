@@ -12,7 +12,7 @@ use multibody::codegen::{Arithmetic, Options};
 use multibody::runtime::catalogue::{self, BoxedMethod};
 use multibody::runtime::constrained::{Effort, Projection, WithPostStep};
 use multibody::runtime::contact::{
-    Cause, ContactEvent, ContactMotion, ContactObserver, ContactStatistics, HybridError, Mode, ModeTable, Regime,
+    ContactEvent, ContactMotion, ContactObserver, ContactStatistics, HybridError, Mode, ModeTable, Regime,
     RegimeChange, RegimeChoice, RegimeReason, RegimeStatistics, SteppingStatistics, Stretch, WithContacts,
 };
 use multibody::runtime::integrate::Statistics;
@@ -254,16 +254,6 @@ fn name(plan: &Plan, k: usize) -> &str {
     plan.model.contacts.get(k).map_or("?", |c| c.name.as_str())
 }
 
-fn cause(cause: Cause) -> &'static str {
-    match cause {
-        Cause::Landed => "lands",
-        Cause::Unloaded => "opens",
-        Cause::Slipped => "slips",
-        Cause::Stopped => "stops",
-        _ => "changes",
-    }
-}
-
 /// What contact `k` does in a mode: where there is no friction, bodies that touch are just closed.
 fn mode(plan: &Plan, k: usize, mode: Mode) -> &'static str {
     let rubs = plan.model.contacts.get(k).is_some_and(|c| c.friction > 0.0);
@@ -343,7 +333,7 @@ pub fn report(plan: &Plan, touched: &Touched, choice: RegimeChoice, out: &mut dy
         )?;
     }
     for event in events.iter().take(SHOWN) {
-        let mut line = format!("  {:>12.9} s  {} {}", event.time, name(plan, event.contact), cause(event.cause));
+        let mut line = format!("  {:>12.9} s  {} {}", event.time, name(plan, event.contact), event.cause.verb());
         if event.impact.is_some() {
             let _ = write!(line, " at {:.6} {}/s", event.approach, unit(plan, event.contact));
         }
@@ -394,7 +384,7 @@ pub fn table(plan: &Plan, events: &[ContactEvent<f64>]) -> String {
     let mut text = String::from("t,contact,event,mode,approach,energy\n");
     for event in events {
         let energy = event.impact.map_or(0.0, |impact| impact.energy);
-        let (what, then) = (cause(event.cause), mode(plan, event.contact, event.modes[1]));
+        let (what, then) = (event.cause.verb(), mode(plan, event.contact, event.modes[1]));
         let _ = writeln!(
             text,
             "{},{},{what},{then},{},{energy}",

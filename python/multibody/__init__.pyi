@@ -1,6 +1,6 @@
 # Written by make_stubs.py.
 import os
-from typing import Any, Dict, List, Literal, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, List, Literal, Mapping, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,29 @@ class Finding(NamedTuple):
     message: str
     help: str
 
+_EventFunction = Callable[[float, _Array, _Array], float]
+
+class Event(NamedTuple):
+    function: _EventFunction
+    direction: Literal["both", "rising", "falling"] = ...
+    terminal: bool = ...
+
+class Crossing(NamedTuple):
+    row: int
+    time: float
+    event: int
+    q: _Array
+    v: _Array
+
+class ContactEvent(NamedTuple):
+    row: int
+    time: float
+    contact: str
+    cause: Literal["lands", "opens", "slips", "stops"]
+    mode: Literal["open", "closed", "sliding", "sticking"]
+    approach: float
+    energy: float
+
 class ModelError(ValueError):
     findings: List[Finding]
 
@@ -34,6 +57,8 @@ class Rollout(NamedTuple):
     q: _Array
     v: _Array
     failures: List[SimulationError]
+    events: List[Any]
+    forces: Optional[_Array]
 
 def load(
     path: Optional[_Path] = ...,
@@ -190,6 +215,9 @@ class Model:
         wrenches: Optional[ArrayLike] = ...,
         gravity: Optional[ArrayLike] = ...,
         drive_q: Optional[ArrayLike] = ...,
+        drive_v: Optional[ArrayLike] = ...,
+        events: Union[bool, Sequence[Union[Event, _EventFunction]], None] = ...,
+        forces: bool = ...,
         threads: Optional[int] = ...,
         out: Optional[Tuple[_Array, _Array]] = ...,
         on_error: Literal["raise", "mark"] = ...,

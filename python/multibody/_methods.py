@@ -6,22 +6,27 @@ import inspect
 import operator
 from collections import namedtuple
 from collections.abc import Mapping
-from typing import Any, Callable, List, NamedTuple, Optional
+from typing import Any, Callable, List, NamedTuple, Optional, Union
 
 import numpy as np
 
 from . import _native
-from ._types import SimulationError
+from ._types import ContactEvent, Crossing, Event, SimulationError
 
 INPUTS = ("tau", "drive_q", "drive_v", "drive_a", "wrenches", "gravity", "params")
 
 
 class Rollout(NamedTuple):
-    """Motions: coordinates ``(B, T+1, nq)``, velocities or momenta ``(B, T+1, nv)``, and the failures of rows."""
+    """Motions: coordinates ``(B, T+1, nq)``, velocities or momenta ``(B, T+1, nv)``, and the failures of rows.
+
+    Where they are asked for: events, row by row and in the order of time, and the forces of contacts ``(B, T+1, C, 3)``.
+    """
 
     q: np.ndarray
     v: np.ndarray
     failures: List[SimulationError]
+    events: List[Union[Crossing, ContactEvent]]
+    forces: Optional[np.ndarray]
 
 
 def parameters(model: Any, given: Any) -> Any:
@@ -47,6 +52,23 @@ def _given(model: Any, inputs: dict) -> "Optional[dict]":
     if inputs.get("params") is not None:
         inputs["params"] = parameters(model, inputs["params"])
     return inputs
+
+
+DIRECTIONS = {"falling": -1, "both": 0, "rising": 1}
+
+
+def _asked(events: Any, forces: bool) -> dict:
+    """What the native part is to tell beside states."""
+    functions = []
+    for event in () if events is None or isinstance(events, bool) else events:
+        if not isinstance(event, Event):
+            event = Event(event)
+        if not callable(event.function):
+            raise TypeError(f"`events` has {event.function!r}: give functions of time, coordinates and velocities")
+        if event.direction not in DIRECTIONS:
+            raise ValueError(f"the direction of an event is {event.direction!r}: take {', '.join(DIRECTIONS)}")
+        functions.append((event.function, DIRECTIONS[event.direction], bool(event.terminal)))
+    return {"contacts": events is True, "forces": bool(forces), "functions": functions}
 
 
 def _documentation(name: str, arguments: list, results: list, doc: str) -> str:
@@ -119,6 +141,9 @@ def rollout(
     wrenches: Any = None,
     gravity: Any = None,
     drive_q: Any = None,
+    drive_v: Any = None,
+    events: Any = None,
+    forces: bool = False,
     threads: Optional[int] = None,
     out: Any = None,
     on_error: str = "raise",
@@ -137,13 +162,20 @@ def rollout(
         ``layout``: order and representation of states and ``u``: ``"mbd"``, ``"pinocchio"`` or ``"mujoco"``.
         ``every``: every how many steps a state is kept.
         ``params``: parameters ``(k,)`` or ``(B, k)``, or a mapping from names to numbers or arrays ``(B,)``.
-        ``wrenches``, ``gravity``, ``drive_q``: further inputs, constant in time; prescribed joints stand still.
+        ``wrenches``, ``gravity``: further inputs, constant in time.
+        ``drive_q``, ``drive_v``: positions and rates of prescribed joints at the ends of all steps, ``(T + 1, n)`` or
+            ``(B, T + 1, n)``, with cubic polynomials between them. With ``drive_q`` alone, ``(n,)`` or ``(B, n)``, they stand still.
+        ``events``: functions ``f(t, q, v)`` whose zeros are looked for, or `Event` with a direction and whether the row ends;
+            states are in the layout of ``x0``. ``True`` asks for the events of contacts.
+        ``forces``: whether the forces of contacts are told, N along the normal and two tangents (N m for stops of rotations).
         ``threads``: number of threads, all cores without; the results are the same bits for any number.
         ``out``: a pair of arrays for ``q`` and ``v``.
         ``on_error``: ``"raise"`` the failure of the first row that fails, or ``"mark"``: rows are NaN from where they failed.
 
-    Returns a `Rollout` of ``q`` ``(B, T + 1, nq)``, ``v`` ``(B, T + 1, nv)``, without ``B`` for a single start, and the list of
-    failures (`SimulationError` with ``row`` and ``time``). The lock of the interpreter is released meanwhile.
+    Returns a `Rollout` of ``q`` ``(B, T + 1, nq)``, ``v`` ``(B, T + 1, nv)``, without ``B`` for a single start, the list of
+    failures (`SimulationError` with ``row`` and ``time``), that of events (`Crossing`, `ContactEvent`) and the forces
+    ``(B, T + 1, C, 3)``, NaN where contacts were followed by time steps, which have impulses. States after a terminal event are NaN.
+    The lock of the interpreter is released meanwhile.
     """
     if on_error not in ("raise", "mark"):
         raise ValueError(f"`on_error` is {on_error!r}: take 'raise' or 'mark'")
@@ -168,7 +200,12 @@ def rollout(
     for name, number, least in (("steps", steps, 0), ("every", every, 1), ("threads", 1 if threads is None else threads, 1)):
         if not least <= operator.index(number) < 2**62:
             raise ValueError(f"`{name}` is {number}: give a number from {least} on")
-    inputs = {"params": params, "wrenches": wrenches, "gravity": gravity, "drive_q": drive_q}
+    inputs = {"params": params, "wrenches": wrenches, "gravity": gravity}
+    if drive_v is None:
+        inputs["drive_q"] = drive_q
+    elif drive_q is None:
+        raise ValueError("`drive_v` needs `drive_q` with as many positions")
+    drives = None if drive_v is None else (drive_q, drive_v)
     settings = {
         "dt": float(dt),
         "steps": steps,
@@ -179,10 +216,10 @@ def rollout(
         "layout": layout,
         "threads": threads,
     }
-    q, v, failures = self._rollout(start, u, settings, _given(self, inputs), out)
-    if failures and on_error == "raise":
-        raise failures[0]
-    return Rollout(q, v, failures)
+    motion = Rollout(*self._rollout(start, u, settings, _asked(events, forces), _given(self, inputs), drives, out))
+    if motion.failures and on_error == "raise":
+        raise motion.failures[0]
+    return motion
 
 
 METHODS = {row[0]: _method(*row) for row in _native.outputs()}

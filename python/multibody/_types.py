@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, List, NamedTuple
+from typing import Any, Callable, Dict, List, NamedTuple
 
 
 class Finding(NamedTuple):
@@ -22,6 +22,45 @@ class Finding(NamedTuple):
         place = f"{self.file}:{self.line}:{self.column}" if self.line else self.file
         help = f"\n  help: {self.help}" if self.help else ""
         return f"{place}: {self.severity}: {self.message}{help}"
+
+
+class Event(NamedTuple):
+    """A function of time and state whose zeros are events of a rollout: ``function(t, q, v)`` gives a number.
+
+    ``direction`` is ``"both"``, ``"rising"`` (from negative values to zero) or ``"falling"``. A ``terminal`` event ends the row.
+    The function should be smooth; it is called from several threads, one at a time.
+    """
+
+    function: "Callable[[float, Any, Any], float]"
+    direction: str = "both"
+    terminal: bool = False
+
+
+class Crossing(NamedTuple):
+    """An event of a row: its time, s, the index of the function that reached zero, and the state there."""
+
+    row: int
+    time: float
+    event: int
+    q: Any
+    v: Any
+
+
+class ContactEvent(NamedTuple):
+    """An event of a contact in a row: its time, s, and the name of the contact.
+
+    ``cause`` is ``"lands"``, ``"opens"``, ``"slips"`` or ``"stops"``, ``mode`` what the contact does then (``"open"``, ``"closed"``
+    without friction, ``"sliding"``, ``"sticking"``), ``approach`` the speed at which the bodies met, m/s, ``energy`` what an impact
+    has changed the kinetic energy by, J.
+    """
+
+    row: int
+    time: float
+    contact: str
+    cause: str
+    mode: str
+    approach: float
+    energy: float
 
 
 class ModelError(ValueError):

@@ -44,7 +44,8 @@ pub fn shape_text(shape: &[usize], batch: Option<&str>) -> String {
 /// The object as a contiguous array of doubles; a copy only where it is none.
 fn doubles<'py>(object: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     if let Ok(array) = object.cast::<PyArrayDyn<f64>>() {
-        if array.is_c_contiguous() {
+        // Arrays that came by a network may lie at any byte.
+        if array.is_c_contiguous() && array.try_readonly().is_ok_and(|array| array.as_slice().is_ok()) {
             return Ok(array.clone());
         }
     }
@@ -57,7 +58,7 @@ fn doubles<'py>(object: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, P
         let dtype = array.getattr("dtype")?.str()?.to_string();
         return Err(refused(&format!("has the dtype {dtype}")));
     }
-    let array = numpy.call_method1("ascontiguousarray", (array, "float64"))?;
+    let array = numpy.call_method1("require", (array, "float64", "CA"))?;
     Ok(array.cast_into::<PyArrayDyn<f64>>()?)
 }
 

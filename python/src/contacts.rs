@@ -13,8 +13,10 @@ use multibody::runtime::integrate::{Dop853, Rk4, Step, StepError, Stepper, Toler
 
 use crate::errors::Failed;
 use crate::machines::set;
-use crate::rollout::{Item, Motion, Settings};
+use crate::rollout::{Item, Motion};
 use crate::rows::Beat;
+use crate::settings::Settings;
+use crate::told::Kept;
 
 type System = WithContacts<ModeTable<Compiled>>;
 type Method = WithPostStep<System, Box<dyn Stepper<System>>, Projection<System>>;
@@ -106,8 +108,27 @@ impl Motion<'_> {
         &self,
         machine: &mut Compiled,
         touching: &mut Touching,
+        item: &mut Item,
+        written: &mut usize,
+        beat: &mut Beat,
+    ) -> Result<(), Failed> {
+        let mut kept = Kept { events: self.asked.contacts.then(Vec::new), forces: self.asked.forces.then(Vec::new) };
+        let row = item.0;
+        let done = self.follow(machine, touching, item, written, &mut kept, beat);
+        self.told.events(row, kept.events.unwrap_or_default());
+        if let Some(forces) = kept.forces {
+            self.told.forces(row, forces);
+        }
+        done
+    }
+
+    fn follow(
+        &self,
+        machine: &mut Compiled,
+        touching: &mut Touching,
         (k, q, v): &mut Item,
         written: &mut usize,
+        kept: &mut Kept,
         beat: &mut Beat,
     ) -> Result<(), Failed> {
         let mut state = self.begin(machine, *k)?;
@@ -121,10 +142,12 @@ impl Motion<'_> {
         let mut motion = motion.map_err(|error| failed(&error))?;
         let (nq, nv) = self.sizes;
         for step in 0..=self.settings.steps {
+            let t = step as f64 * self.settings.dt;
             if step.is_multiple_of(self.settings.every) {
                 let at = *written;
                 let (q, v) = (&mut q[at * nq..(at + 1) * nq], &mut v[at * nv..(at + 1) * nv]);
-                self.store(system.system_mut(), &mut state, q, v);
+                kept.forces(&system, motion.regime(), t, &state);
+                self.store(system.system_mut(), t, &mut state, q, v);
                 *written += 1;
             }
             if step == self.settings.steps {
@@ -141,7 +164,7 @@ impl Motion<'_> {
                     return Err(failed(&error.into()));
                 }
                 left -= 1;
-                motion.advance(&mut system, end, &mut ()).map_err(|error| failed(&error))?;
+                motion.advance(&mut system, end, kept).map_err(|error| failed(&error))?;
                 if !beat.goes_on() {
                     return Ok(());
                 }

@@ -10,7 +10,8 @@ use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-const TYPES: &str = "multibody._types";
+/// The module with the classes.
+pub const TYPES: &str = "multibody._types";
 
 /// Findings as objects of Python.
 pub fn findings<'py>(py: Python<'py>, findings: &[Diagnostic]) -> PyResult<Bound<'py, PyList>> {

@@ -4,6 +4,7 @@
 mod arrays;
 mod contacts;
 mod driver;
+mod drives;
 mod errors;
 mod evaluate;
 mod generate;
@@ -13,6 +14,8 @@ mod pairs;
 mod read;
 mod rollout;
 mod rows;
+mod settings;
+mod told;
 
 use std::path::PathBuf;
 
@@ -80,6 +83,7 @@ fn methods() -> Vec<(&'static str, &'static str, bool)> {
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<model::Model>()?;
     module.add_function(wrap_pyfunction!(model::load, module)?)?;
+    module.add_function(wrap_pyfunction!(model::restore, module)?)?;
     module.add_function(wrap_pyfunction!(check, module)?)?;
     module.add_function(wrap_pyfunction!(convert, module)?)?;
     module.add_function(wrap_pyfunction!(outputs, module)?)?;

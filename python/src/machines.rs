@@ -73,7 +73,9 @@ impl Machines {
 
     /// Keeps one for later, after a call that has set these of [`FIELDS`].
     pub fn give_back(&self, mut machine: Compiled, fields: impl Iterator<Item = usize>) {
-        fields.for_each(|field| set(&mut machine, field, &self.defaults[field]));
+        machine.set_drives(None);
+        let drives = FIELDS.iter().enumerate().filter(|(_, field)| ["drive_q", "drive_v"].contains(&field.array.name));
+        fields.chain(drives.map(|(at, _)| at)).for_each(|field| set(&mut machine, field, &self.defaults[field]));
         machine.inputs().tau.fill(0.0);
         self.pool.lock().unwrap_or_else(PoisonError::into_inner).push(machine);
     }

@@ -19,7 +19,7 @@ use pyo3::types::{PyDict, PyList, PyTuple};
 use crate::arrays::{batch, Given};
 use crate::errors::{compile_error, constraint_numbers, findings, Failed};
 use crate::machines::{Inputs, Machines};
-use crate::{evaluate, generate, read, rollout};
+use crate::{evaluate, generate, read, rollout, settings, told};
 
 /// A mechanism that was read and checked. Its functions are machine code, made when they are first called.
 ///
@@ -31,6 +31,7 @@ pub struct Model {
     /// Names and places in the state; without a search.
     pub(crate) plan: Plan,
     options: Options,
+    recipe: Recipe,
     machines: OnceLock<Result<Machines, CompileError>>,
 }
 
@@ -202,17 +203,19 @@ impl Model {
         evaluate::evaluate(py, machines, output, arguments, &inputs, out)
     }
 
-    #[pyo3(signature = (start, u, settings, inputs = None, out = None))]
+    #[pyo3(signature = (start, u, settings, asked, inputs = None, drives = None, out = None))]
     fn _rollout<'py>(
         &self,
         py: Python<'py>,
         start: (Bound<'py, PyAny>, Bound<'py, PyAny>),
         u: Option<Bound<'py, PyAny>>,
-        settings: rollout::Settings,
+        settings: settings::Settings,
+        asked: told::Asked,
         inputs: Option<&Bound<'py, PyDict>>,
+        drives: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
         out: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
     ) -> PyResult<rollout::Results<'py>> {
-        rollout::rollout(py, self, start, u, settings, inputs, out)
+        rollout::rollout(py, self, start, rollout::Beside { u, inputs, drives }, settings, asked, out)
     }
 
     /// Moves coordinates to the nearest ones that close the loops and meet the couplings.
@@ -258,6 +261,11 @@ impl Model {
         generate::generate(py, &self.description, &self.options, asked)
     }
 
+    /// Models are pickled as their texts and read again.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Recipe,))> {
+        Ok((py.import("multibody._native")?.getattr("_restore")?, (self.recipe.clone(),)))
+    }
+
     fn __repr__(&self) -> String {
         let d = self.plan.dims;
         format!("<multibody.Model {} (nq={}, nv={})>", self.description.name, d.nq, d.nv)
@@ -277,25 +285,41 @@ pub fn load(
     gravity: Option<[f64; 3]>,
     limits: bool,
     floor: Option<(f64, f64)>,
-    variant: Option<&str>,
+    variant: Option<String>,
     wrenches: Vec<String>,
     arithmetic: &str,
     search: bool,
 ) -> PyResult<Model> {
-    let source = read::source(path, text, format)?;
-    let import = read::options(base, gravity, limits, floor)?;
+    let read::Source { file, text } = read::source(path, text, format)?;
+    let reading = (base.to_string(), gravity, limits, floor, variant, wrenches);
+    restore(py, (file, text, reading, (arithmetic.to_string(), search), Default::default()))
+}
+
+/// Settings of [`load`] about the description.
+type Reading = (String, Option<[f64; 3]>, bool, Option<(f64, f64)>, Option<String>, Vec<String>);
+
+/// All that a model is made of: the name of its file, its text, settings of reading and of computing, other files.
+pub type Recipe = (String, String, Reading, (String, bool), read::Files);
+
+/// Makes a model of its recipe, on another machine as well.
+#[pyfunction(name = "_restore")]
+pub fn restore(py: Python<'_>, mut recipe: Recipe) -> PyResult<Model> {
+    let (file, text, (base, gravity, limits, floor, variant, wrenches), (arithmetic, search), files) = &mut recipe;
+    let source = read::Source { file: file.clone(), text: text.clone() };
+    let import = read::options(base, *gravity, *limits, *floor)?;
     let Some(arithmetic) = Arithmetic::from_name(arithmetic) else {
         let names = Arithmetic::ALL.map(Arithmetic::name).join(", ");
         return Err(PyValueError::new_err(format!("no arithmetic is called `{arithmetic}`: take one of {names}")));
     };
-    let (description, found) = read::model(py, &source, &import, variant, &wrenches)?;
-    let plan = if search { PlanOptions::default() } else { PlanOptions::quick() };
+    let (description, found) = read::model(py, &source, &import, variant.as_deref(), wrenches, files)?;
+    let plan = if *search { PlanOptions::default() } else { PlanOptions::quick() };
     let options = Options { arithmetic, plan, ..Options::default() };
     Ok(Model {
         plan: py.detach(|| Plan::new(&description, plan.snap)),
         findings: findings(py, &found.0)?.unbind(),
         description,
         options,
+        recipe,
         machines: OnceLock::new(),
     })
 }

@@ -1,6 +1,8 @@
 //! Reading, checking and converting descriptions.
 
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use multibody::codegen::diag::Diagnostics;
 use multibody::codegen::model::{Model, Wrench, WrenchAxes};
@@ -14,8 +16,8 @@ use crate::errors::{about_model, findings, model_error, unreadable};
 
 /// A text and the name of its file.
 pub struct Source {
-    file: String,
-    text: String,
+    pub file: String,
+    pub text: String,
 }
 
 /// The text of a file, or one that is given with its format.
@@ -47,15 +49,30 @@ pub fn options(
     Ok(ImportOptions { base, gravity, limits, floor })
 }
 
-/// Reads a model, with the wrenches that are asked for by the names of bodies.
+/// Files that a description reads, by their paths.
+pub type Files = BTreeMap<PathBuf, Vec<u8>>;
+
+/// Reads a model, with the wrenches that are asked for by the names of bodies. What it reads beside the text is taken from
+/// `files`, or kept there.
 pub fn model(
     py: Python<'_>,
     source: &Source,
     options: &ImportOptions,
     variant: Option<&str>,
     wrenches: &[String],
+    files: &mut Files,
 ) -> PyResult<(Model, Diagnostics)> {
-    let read = || read::load_variant(&source.file, &source.text, options, &read::read_bytes, variant);
+    let known = Mutex::new(files);
+    let file = |path: &Path| {
+        let mut files = known.lock().unwrap_or_else(PoisonError::into_inner);
+        match files.get(path) {
+            Some(bytes) => Ok(bytes.clone()),
+            None => read::read_bytes(path).inspect(|bytes| {
+                files.insert(path.into(), bytes.clone());
+            }),
+        }
+    };
+    let read = || read::load_variant(&source.file, &source.text, options, &file, variant);
     let (model, found) = py.detach(read);
     let Some(mut model) = model else { return Err(model_error(py, &found)) };
     for name in wrenches {

@@ -4,8 +4,6 @@ use std::sync::{Mutex, PoisonError};
 
 use multibody::codegen::jit::{Compiled, CompiledLanes, LANES};
 use multibody::codegen::output::Output;
-use multibody::codegen::plan::state_layout;
-use multibody::runtime::catalogue;
 use multibody::runtime::integrate::StepError;
 use multibody::runtime::layout::Layout;
 use multibody::runtime::{Conjugate, Constrained, System};
@@ -17,73 +15,33 @@ use pyo3::types::{PyDict, PyList};
 use crate::arrays::{result, writable, Given, Rows};
 use crate::contacts::{self, Touching};
 use crate::driver::Driver;
+use crate::drives::{self, Moving};
 use crate::errors::{compile_error, Failed};
 use crate::machines::{set, Inputs, Machines};
 use crate::model::Model;
 use crate::pairs;
 use crate::rows::{on_threads, Beat};
+use crate::settings::Settings;
+use crate::told::{self, Asked, Told, Watcher};
 
 /// Residual up to which the loops of a start count as closed, m or rad.
 const OPEN: f64 = 1e-6;
 
-/// Coordinates, velocities or momenta, failures.
-pub type Results<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyList>);
+/// Coordinates, velocities or momenta, failures, events, forces of contacts.
+pub type Results<'py> = (
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyArrayDyn<f64>>,
+    Bound<'py, PyList>,
+    Bound<'py, PyList>,
+    Option<Bound<'py, PyAny>>,
+);
 
-/// How motions are computed; a dictionary of Python.
-#[derive(FromPyObject)]
-#[pyo3(from_item_all)]
-pub struct Settings {
-    pub dt: f64,
-    pub steps: usize,
-    pub every: usize,
-    pub method: String,
-    pub tolerance: Option<f64>,
-    pub momenta: bool,
-    layout: String,
-    threads: Option<usize>,
-}
-
-impl Settings {
-    /// Refuses what cannot be computed.
-    fn check(&self) -> PyResult<()> {
-        let refuse = |words: String| Err(PyValueError::new_err(words));
-        let Some(entry) = catalogue::entry(&self.method) else {
-            let names: Vec<&str> = catalogue::entries().map(|entry| entry.name).collect();
-            return refuse(format!("no method is called `{}`: take one of {}", self.method, names.join(", ")));
-        };
-        if !(self.dt > 0.0 && self.dt.is_finite()) {
-            return refuse(format!("`dt` is {}: give a step in s, greater than zero", self.dt));
-        }
-        if !self.steps.is_multiple_of(self.every) || self.every == 0 {
-            return refuse(format!("`every` is {}, which does not divide {} steps", self.every, self.steps));
-        }
-        if self.threads == Some(0) {
-            return refuse("`threads` is 0: give at least one, or None for one on each core".into());
-        }
-        match self.tolerance {
-            Some(tolerance) if !(tolerance > 0.0 && tolerance < 1.0) => {
-                refuse(format!("`tolerance` is {tolerance}: give a number between 0 and 1"))
-            }
-            Some(_) if !entry.adaptive => {
-                let names: Vec<&str> = catalogue::entries().filter(|e| e.adaptive).map(|e| e.name).collect();
-                let (method, names) = (&self.method, names.join(", "));
-                refuse(format!("`{method}` has fixed steps: leave `tolerance` out, or take one of {names}"))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    fn layout(&self, model: &Model) -> PyResult<Option<Layout>> {
-        match &self.layout[..] {
-            "mbd" => Ok(None),
-            "pinocchio" => Ok(Some(state_layout::pinocchio(&model.plan))),
-            "mujoco" => Ok(Some(state_layout::mujoco(&model.plan))),
-            other => {
-                let words = format!("no layout is called `{other}`: take mbd, pinocchio or mujoco");
-                Err(PyValueError::new_err(words))
-            }
-        }
-    }
+/// What is given beside starts and settings.
+pub struct Beside<'a, 'py> {
+    pub u: Option<Bound<'py, PyAny>>,
+    pub inputs: Option<&'a Bound<'py, PyDict>>,
+    /// Positions and rates of the prescribed joints.
+    pub drives: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
 }
 
 /// Motions of all rows.
@@ -91,13 +49,14 @@ pub fn rollout<'py>(
     py: Python<'py>,
     model: &Model,
     start: (Bound<'py, PyAny>, Bound<'py, PyAny>),
-    u: Option<Bound<'py, PyAny>>,
+    beside: Beside<'_, 'py>,
     settings: Settings,
-    inputs: Option<&Bound<'py, PyDict>>,
+    asked: Asked,
     out: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
 ) -> PyResult<Results<'py>> {
     settings.check()?;
     let touches = !model.description.contacts.is_empty();
+    asked.check(touches)?;
     if touches && !contacts::METHODS.contains(&&settings.method[..]) {
         let (method, names) = (&settings.method, contacts::METHODS.join(" or "));
         return Err(PyValueError::new_err(format!(
@@ -117,13 +76,17 @@ pub fn rollout<'py>(
     let second = if settings.momenta { "p0" } else { "v0" };
     let q0 = Given::read(&start.0, "q0", &[nq])?;
     let v0 = Given::read(&start.1, second, &[nv])?;
-    let u = u.map(|u| Given::read(&u, "u", &[settings.steps, nv])).transpose()?;
-    let inputs = Inputs::read(inputs, &machines.sizes())?;
-    let batch = inputs.batch([Some(&q0), Some(&v0), u.as_ref()].into_iter().flatten())?;
+    let u = beside.u.map(|u| Given::read(&u, "u", &[settings.steps, nv])).transpose()?;
+    let inputs = Inputs::read(beside.inputs, &machines.sizes())?;
+    let moving = beside.drives.as_ref();
+    let moving = moving.map(|d| Moving::read(d, &model.plan, &machines.sizes(), settings.steps)).transpose()?;
+    let (drive_q, drive_v) = (moving.as_ref().map(|m| &m.q), moving.as_ref().map(|m| &m.v));
+    let batch = inputs.batch([Some(&q0), Some(&v0), u.as_ref(), drive_q, drive_v].into_iter().flatten())?;
     let count = (settings.steps / settings.every).saturating_add(1);
     let shape = |n: usize| -> Vec<usize> { batch.into_iter().chain([count, n]).collect() };
     let (q_out, v_out) = (out.as_ref().map(|out| &out.0), out.as_ref().map(|out| &out.1));
     let (q, v) = (result(py, q_out, "q", &shape(nq))?, result(py, v_out, "v", &shape(nv))?);
+    let (told, rows) = (Told::default(), batch.unwrap_or(1));
     let failures = {
         let (mut q_lock, mut v_lock) = (writable(&q, "q")?, writable(&v, "v")?);
         let (q_all, v_all) = (q_lock.as_slice_mut()?, v_lock.as_slice_mut()?);
@@ -135,15 +98,22 @@ pub fn rollout<'py>(
             start: (q0.rows()?, v0.rows()?),
             u: u.as_ref().map(Given::rows).transpose()?,
             fields,
+            moving: moving.as_ref().map(|m| Ok::<_, PyErr>((m.q.rows()?, m.v.rows()?))).transpose()?,
             touching,
+            asked: &asked,
+            told: &told,
         };
-        motion.all(py, machines, batch.unwrap_or(1), (q_all, v_all))?
+        motion.all(py, machines, rows, (q_all, v_all))?
     };
     let list = PyList::empty(py);
     for (row, failed) in failures {
         list.append(failed.object(py, row)?)?;
     }
-    Ok((q, v, list))
+    let forces = asked.forces.then(|| {
+        let shape = batch.into_iter().chain([count, model.description.contacts.len(), 3]);
+        told::forces_array(py, &told, shape.collect(), rows)
+    });
+    Ok((q, v, list, told.list(py, &model.plan)?, forces.transpose()?))
 }
 
 /// What all rows have in common.
@@ -155,8 +125,12 @@ pub struct Motion<'a> {
     start: (Rows<'a>, Rows<'a>),
     pub u: Option<Rows<'a>>,
     pub fields: Vec<(usize, Rows<'a>)>,
+    /// Positions and rates of prescribed joints that move.
+    moving: Option<(Rows<'a>, Rows<'a>)>,
     /// For models with contacts.
     touching: Option<Touching>,
+    pub asked: &'a Asked,
+    pub told: &'a Told,
 }
 
 /// The state of a row, and memory.
@@ -217,7 +191,8 @@ impl Motion<'_> {
     /// Whether rows can be computed several at once.
     fn at_once(&self, machines: &Machines, rows: usize) -> bool {
         let Settings { method, tolerance, .. } = self.settings;
-        rows >= LANES && self.touching.is_none() && machines.sizes().rows == 0 && pairs::possible(method, *tolerance)
+        let alone = self.touching.is_some() || self.moving.is_some() || !self.asked.functions.is_empty();
+        rows >= LANES && !alone && machines.sizes().rows == 0 && pairs::possible(method, *tolerance)
     }
 
     /// Computes some rows, at once if possible; returns those that fail.
@@ -253,6 +228,9 @@ impl Motion<'_> {
         let Memory { machine, touching, .. } = memory;
         self.fields.iter().for_each(|(field, rows)| set(machine, *field, rows.row(item.0)));
         machine.inputs().tau.fill(0.0);
+        if let Some(moving) = self.moving {
+            drives::follow(machine, self.settings.dt, moving, item.0);
+        }
         let mut written = 0;
         let done = match touching {
             Some(touching) => self.row_with_contacts(machine, touching, &mut item, &mut written, beat),
@@ -275,13 +253,16 @@ impl Motion<'_> {
         beat: &mut Beat,
     ) -> Result<(), Failed> {
         let mut state = self.begin(machine, *k)?;
-        let mut driver = Driver::new(self.settings, machine, &state).map_err(|e| failed(machine, &e))?;
+        let mut watcher = (!self.asked.functions.is_empty()).then(|| Watcher::new(self, &state));
+        let driver = Driver::new(self.settings, machine, &state, watcher.is_some());
+        let mut driver = driver.map_err(|e| failed(machine, &e))?;
         let u = self.u.map(|u| u.row(*k));
         let (nq, nv) = self.sizes;
         for step in 0..=self.settings.steps {
             if step.is_multiple_of(self.settings.every) {
                 let at = *written;
-                self.store(machine, &mut state, &mut q[at * nq..(at + 1) * nq], &mut v[at * nv..(at + 1) * nv]);
+                let t = step as f64 * self.settings.dt;
+                self.store(machine, t, &mut state, &mut q[at * nq..(at + 1) * nq], &mut v[at * nv..(at + 1) * nv]);
                 *written += 1;
             }
             if step == self.settings.steps {
@@ -295,8 +276,20 @@ impl Motion<'_> {
                     Some(layout) => layout.v_from(&state.q, u, tau),
                 }
             }
-            let go_on = driver.step(self.settings, machine, step, u.is_some(), &mut state, beat);
-            if !go_on.map_err(|e| failed(machine, &e))? {
+            let (settings, driven) = (self.settings, u.is_some());
+            let go_on = match &mut watcher {
+                None => driver.step(settings, machine, step, driven, &mut state, beat),
+                Some(watcher) => driver.step_to_event(settings, machine, step, driven, &mut state, watcher),
+            };
+            let raised = watcher.as_mut().and_then(|watcher| {
+                self.told.events(*k, watcher.events.drain(..));
+                watcher.error.take()
+            });
+            if let Some(error) = raised {
+                beat.stop_with(error);
+                break;
+            }
+            if !go_on.map_err(|e| failed(machine, &e))? || !beat.goes_on() {
                 break;
             }
         }
@@ -322,6 +315,7 @@ impl Motion<'_> {
             return Err(Failed::start("not_finite", words, vec![("index", index as f64)]));
         }
         let mut p = second.clone();
+        machine.drive_to(0.0);
         if !self.settings.momenta {
             machine.conjugate_momenta(&q, &second, &mut p);
         }
@@ -333,9 +327,10 @@ impl Motion<'_> {
         Ok(State { q, p, v: second })
     }
 
-    /// Writes the state as a row of the result.
-    pub fn store(&self, machine: &mut Compiled, state: &mut State, q: &mut [f64], v: &mut [f64]) {
+    /// Writes the state at time `t` as a row of the result.
+    pub fn store(&self, machine: &mut Compiled, t: f64, state: &mut State, q: &mut [f64], v: &mut [f64]) {
         if !self.settings.momenta {
+            machine.drive_to(t);
             machine.velocities(&state.q, &state.p, &mut state.v);
         }
         let second = if self.settings.momenta { &state.p } else { &state.v };

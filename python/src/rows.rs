@@ -14,14 +14,14 @@ const STEPS: u32 = 64;
 /// Tells whether a row is to go on.
 pub struct Beat<'a> {
     stop: &'a AtomicBool,
+    error: &'a Mutex<Option<PyErr>>,
     /// Only the thread that Python has called asks it.
-    caller: Option<Caller<'a>>,
+    caller: Option<Caller>,
 }
 
-struct Caller<'a> {
+struct Caller {
     last: Instant,
     steps: u32,
-    error: &'a Mutex<Option<PyErr>>,
 }
 
 impl Beat<'_> {
@@ -43,9 +43,14 @@ impl Beat<'_> {
         let Some(caller) = self.caller.as_mut().filter(|caller| caller.last.elapsed() >= LOOK) else { return };
         caller.last = Instant::now();
         if let Err(error) = Python::attach(|py| py.check_signals()) {
-            caller.error.lock().unwrap_or_else(PoisonError::into_inner).replace(error);
-            self.stop.store(true, Ordering::Relaxed);
+            self.stop_with(error);
         }
+    }
+
+    /// Ends all rows; the caller gets the exception, the first one if there are several.
+    pub fn stop_with(&self, error: PyErr) {
+        self.error.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+        self.stop.store(true, Ordering::Relaxed);
     }
 }
 
@@ -53,7 +58,7 @@ impl Beat<'_> {
 /// Called without the lock of the interpreter.
 ///
 /// # Errors
-/// What Python was interrupted with.
+/// What Python was interrupted with, or what [`Beat::stop_with`] was given.
 pub fn on_threads<T: Send, M>(
     items: impl Iterator<Item = T> + Send,
     threads: usize,
@@ -78,13 +83,13 @@ pub fn on_threads<T: Send, M>(
     std::thread::scope(|scope| {
         for _ in 1..threads {
             scope.spawn(|| {
-                all(&mut Beat { stop: &stop, caller: None });
+                all(&mut Beat { stop: &stop, error: &error, caller: None });
                 left.fetch_sub(1, Ordering::Release);
                 caller.unpark();
             });
         }
-        let own = Caller { last: Instant::now(), steps: 0, error: &error };
-        let mut beat = Beat { stop: &stop, caller: Some(own) };
+        let own = Caller { last: Instant::now(), steps: 0 };
+        let mut beat = Beat { stop: &stop, error: &error, caller: Some(own) };
         all(&mut beat);
         while left.load(Ordering::Acquire) > 0 {
             std::thread::park_timeout(LOOK);

@@ -102,6 +102,11 @@ def test_arrays_that_are_not_contiguous_or_double(arm):
     single = q.astype(np.float32)
     assert (arm.mass_matrix(single) == arm.mass_matrix(single.astype(float))).all()
     assert arm.mass_matrix([0, 0, 0, 0, 0, 0]).shape == (6, 6)
+    # As arrays that came by a network may lie in memory.
+    shifted = np.frombuffer(b"\0" + q.tobytes(), dtype=np.uint8)[1:].view(np.float64).reshape(q.shape)
+    assert shifted.flags.c_contiguous and not shifted.flags.aligned
+    assert (arm.momenta(shifted, v) == arm.momenta(q, v)).all()
+    assert (arm.momenta(q.astype(">f8"), v) == arm.momenta(q, v)).all()
 
 
 @pytest.mark.parametrize(

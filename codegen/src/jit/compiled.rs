@@ -52,6 +52,8 @@ pub struct Compiled<S: Number = f64> {
     scratch: Vec<S>,
     /// Arguments and results that have to be copied.
     pub(super) copies: Vec<S>,
+    /// Motion of the prescribed joints, where it is a function of time.
+    pub(super) drives: Option<Arc<dyn super::Drives<S>>>,
 }
 
 /// What all clones have in common.
@@ -130,7 +132,6 @@ impl<S: Number> Compiled<S> {
         let shared =
             Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new(), lanes: OnceLock::new() };
         let (acts, shared) = (vec![S::one(); sizes.acts], Arc::new(shared));
-        let (scratch, copies) = (Vec::new(), Vec::new());
         Ok(Compiled {
             shared,
             interpreter,
@@ -139,8 +140,9 @@ impl<S: Number> Compiled<S> {
             calls: Vec::new(),
             params,
             acts,
-            scratch,
-            copies,
+            scratch: Vec::new(),
+            copies: Vec::new(),
+            drives: None,
         })
     }
 

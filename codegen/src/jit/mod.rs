@@ -22,6 +22,7 @@
 //! ```
 
 mod compiled;
+mod drives;
 mod error;
 mod instructions;
 mod interpreted;
@@ -30,6 +31,7 @@ mod memory;
 mod traits;
 
 pub use compiled::Compiled;
+pub use drives::{Drives, SampledDrives};
 pub use error::CompileError;
 pub use lanes::{CompiledLanes, LANES};
 pub use memory::Number;

@@ -27,6 +27,7 @@ impl<S: Number> System for Compiled<S> {
 
     #[inline]
     fn rates_at(&mut self, t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
+        self.drive_to(t);
         if !self.run(Output::Rates, [q, p, &[]], &mut [qd, pd]) {
             self.interpreter.rates_at(t, q, p, qd, pd);
         }
@@ -72,7 +73,12 @@ impl<S: Number> Differentiable for Compiled<S> {
         self.interpreter.square()
     }
 
+    fn depends_on_time(&self) -> bool {
+        self.is_driven()
+    }
+
     fn rate_derivatives(&mut self, t: S, q: &Vec<S>, p: &Vec<S>, out: &mut StateDerivatives<Vec<S>, Vec<Vec<S>>>) {
+        self.drive_to(t);
         let nv = p.len();
         let mut copies = std::mem::take(&mut self.copies);
         copies.resize((4 * nv * nv).max(copies.len()), S::zero());
@@ -123,6 +129,7 @@ impl<S: Number> Constrained for Compiled<S> {
     }
 
     fn project_momenta(&mut self, t: S, q: &Vec<S>, p: &mut Vec<S>, v: &mut Vec<S>, sigma: &mut Vec<S>) {
+        self.drive_to(t);
         let mut augmented = std::mem::take(&mut self.copies);
         augmented.resize(p.len().max(augmented.len()), S::zero());
         augmented[..p.len()].copy_from_slice(p);
@@ -141,6 +148,7 @@ impl<S: Number> Constrained for Compiled<S> {
     }
 
     fn multipliers(&mut self, t: S, q: &Vec<S>, v: &Vec<S>, lambda: &mut Vec<S>) {
+        self.drive_to(t);
         if !self.run(Output::Multipliers, [q, v, &[]], &mut [lambda]) {
             self.interpreter.multipliers(t, q, v, lambda);
         }

@@ -66,6 +66,18 @@ pub enum Cause {
     Stopped,
 }
 
+impl Cause {
+    /// What the contact does, a verb.
+    pub const fn verb(self) -> &'static str {
+        match self {
+            Cause::Landed => "lands",
+            Cause::Unloaded => "opens",
+            Cause::Slipped => "slips",
+            Cause::Stopped => "stops",
+        }
+    }
+}
+
 /// An event of a motion with contacts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]

@@ -1,0 +1,67 @@
+//! Settings of rollouts.
+
+use multibody::codegen::plan::state_layout;
+use multibody::runtime::catalogue;
+use multibody::runtime::layout::Layout;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::model::Model;
+
+/// How motions are computed; a dictionary of Python.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct Settings {
+    pub dt: f64,
+    pub steps: usize,
+    pub every: usize,
+    pub method: String,
+    pub tolerance: Option<f64>,
+    pub momenta: bool,
+    layout: String,
+    pub threads: Option<usize>,
+}
+
+impl Settings {
+    /// Refuses what cannot be computed.
+    pub fn check(&self) -> PyResult<()> {
+        let refuse = |words: String| Err(PyValueError::new_err(words));
+        let Some(entry) = catalogue::entry(&self.method) else {
+            let names: Vec<&str> = catalogue::entries().map(|entry| entry.name).collect();
+            return refuse(format!("no method is called `{}`: take one of {}", self.method, names.join(", ")));
+        };
+        if !(self.dt > 0.0 && self.dt.is_finite()) {
+            return refuse(format!("`dt` is {}: give a step in s, greater than zero", self.dt));
+        }
+        if !self.steps.is_multiple_of(self.every) || self.every == 0 {
+            return refuse(format!("`every` is {}, which does not divide {} steps", self.every, self.steps));
+        }
+        if self.threads == Some(0) {
+            return refuse("`threads` is 0: give at least one, or None for one on each core".into());
+        }
+        match self.tolerance {
+            Some(tolerance) if !(tolerance > 0.0 && tolerance < 1.0) => {
+                refuse(format!("`tolerance` is {tolerance}: give a number between 0 and 1"))
+            }
+            Some(_) if !entry.adaptive => {
+                let names: Vec<&str> = catalogue::entries().filter(|e| e.adaptive).map(|e| e.name).collect();
+                let (method, names) = (&self.method, names.join(", "));
+                refuse(format!("`{method}` has fixed steps: leave `tolerance` out, or take one of {names}"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The layout of states and joint forces; `None` for that of this project.
+    pub fn layout(&self, model: &Model) -> PyResult<Option<Layout>> {
+        match &self.layout[..] {
+            "mbd" => Ok(None),
+            "pinocchio" => Ok(Some(state_layout::pinocchio(&model.plan))),
+            "mujoco" => Ok(Some(state_layout::mujoco(&model.plan))),
+            other => {
+                let words = format!("no layout is called `{other}`: take mbd, pinocchio or mujoco");
+                Err(PyValueError::new_err(words))
+            }
+        }
+    }
+}
