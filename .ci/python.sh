@@ -5,9 +5,9 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=$PWD/target
 venv=target/python-venv
-[ -x $venv/bin/pytest ] || {
+[ -x $venv/bin/dask ] || {
     python3 -m venv $venv
-    $venv/bin/pip install --quiet 'maturin>=1.16,<2' 'numpy>=1.22' pytest 'gymnasium>=1.0'
+    $venv/bin/pip install --quiet 'maturin>=1.16,<2' 'numpy>=1.22' pytest 'gymnasium>=1.0' dask distributed
 }
 cargo fmt --check --manifest-path python/Cargo.toml
 cargo clippy --release --locked --manifest-path python/Cargo.toml -- -D warnings

@@ -48,8 +48,15 @@ names=()
 for crate in "${crates[@]}"; do names+=(-p "$crate"); done
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
-cargo publish "${options[@]}" "${names[@]}" > "$log" 2>&1 || { cat "$log" >&2; exit 1; }
-grep -E 'Packag(ed|ing)' "$log"
+if cargo publish "${options[@]}" "${names[@]}" > "$log" 2>&1; then
+    grep -E 'Packag(ed|ing)' "$log"
+elif [ -z "$full" ] && grep -qiE 'HTTP request|could not resolve|network|timed out' "$log"; then
+    echo "the registry cannot be reached: files of the packages only"
+    for crate in "${crates[@]}"; do echo "$crate: $(cargo package --list --allow-dirty --locked -p "$crate" | wc -l) files"; done
+else
+    cat "$log" >&2
+    exit 1
+fi
 echo "crates and Python package: $version"
 [ -n "$full" ] || exit 0
 

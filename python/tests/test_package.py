@@ -1,5 +1,6 @@
 """The stubs, the documentation, the environments."""
 
+import concurrent.futures
 import importlib.util
 import inspect
 import pathlib
@@ -12,6 +13,7 @@ import pytest
 from conftest import MODELS, REPOSITORY
 
 import multibody
+import multibody.distributed
 import multibody.gym
 
 PACKAGE = pathlib.Path(multibody.__file__).parent
@@ -30,10 +32,11 @@ def test_every_public_name_is_documented_and_in_the_stubs():
     for name in public(multibody.Model):
         assert inspect.getdoc(getattr(multibody.Model, name)), name
         assert re.search(rf"^    def {name}\(", inside, re.M), name
-    gym = (PACKAGE / "gym.pyi").read_text()
-    for name in multibody.gym.__all__:
-        assert inspect.getdoc(getattr(multibody.gym, name)), name
-        assert re.search(rf"^(def|class) {name}\b", gym, re.M), name
+    for module in (multibody.gym, multibody.distributed):
+        text = (PACKAGE / module.__name__.split(".")[-1]).with_suffix(".pyi").read_text()
+        for name in module.__all__:
+            assert inspect.getdoc(getattr(module, name)), name
+            assert re.search(rf"^(def|class) {name}\b", text, re.M), name
     assert (PACKAGE / "py.typed").exists()
 
 
@@ -52,8 +55,19 @@ def test_outputs_are_methods_with_shapes_in_their_documentation():
 
 
 def test_import_is_light():
-    code = "import sys, multibody; print([m for m in ('gymnasium', 'torch', 'mujoco') if m in sys.modules])"
+    code = "import sys, multibody; print([m for m in ('gymnasium', 'torch', 'mujoco', 'distributed', 'ray') if m in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+
+
+def test_import_takes_no_longer_than_numpy_and_a_little():
+    """Most of the time is NumPy's; what is added is less than 0.1 s, here in processor time, which others disturb less."""
+    code = """import time
+t = time.process_time(); import numpy
+u = time.process_time(); import multibody
+print(time.process_time() - u, u - t)"""
+    run = [sys.executable, "-c", code]
+    added = [float(subprocess.run(run, capture_output=True, text=True, check=True).stdout.split()[0]) for _ in range(3)]
+    assert min(added) < 0.1, added
 
 
 def blocks():
@@ -68,6 +82,8 @@ def test_the_programs_of_the_book_run(monkeypatch):
         if "gymnasium" in block or "multibody.gym" in block:
             pytest.importorskip("gymnasium")
         exec(compile(block, "python.md", "exec"), names)  # noqa: S102
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        names["search"](pool)
 
 
 def environment(**settings):
