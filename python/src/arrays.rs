@@ -3,9 +3,12 @@
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyReadwriteArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::{PySlice, PyTuple};
 
-/// Number of entries of arrays that there is always memory for.
-const FEW: usize = 1 << 16;
+/// Number of entries from which on arrays for results begin where JAX takes them without a copy: at a multiple of so many
+/// bytes. Copies of shorter ones take less time than the care for that.
+const MANY: usize = 512;
+const ALIGNMENT: usize = 64;
 
 /// An array of one or of many rows that a caller gave.
 pub struct Given<'py> {
@@ -116,13 +119,11 @@ pub fn result<'py>(
     shape: &[usize],
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let Some(given) = given.filter(|given| !given.is_none()) else {
-        // NumPy itself says that it has no memory for so much.
-        let few = shape.iter().try_fold(1_usize, |all, n| all.checked_mul(*n)).is_some_and(|all| all < FEW);
-        if few {
-            return Ok(PyArrayDyn::zeros(py, shape.to_vec(), false));
-        }
-        let zeros = py.import("numpy")?.call_method1("zeros", (pyo3::types::PyTuple::new(py, shape)?,))?;
-        return Ok(zeros.cast_into::<PyArrayDyn<f64>>()?);
+        let total = shape.iter().try_fold(1_usize, |all, n| all.checked_mul(*n));
+        return match total {
+            Some(total) if total < MANY => Ok(PyArrayDyn::zeros(py, shape.to_vec(), false)),
+            _ => aligned(py, shape, total),
+        };
     };
     let array = given
         .cast::<PyArrayDyn<f64>>()
@@ -134,6 +135,20 @@ pub fn result<'py>(
         )));
     }
     Ok(array.clone())
+}
+
+/// Zeros that begin at a multiple of [`ALIGNMENT`] bytes.
+fn aligned<'py>(py: Python<'py>, shape: &[usize], total: Option<usize>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    // NumPy itself says that it has no memory for so much.
+    let zeros = |of: Bound<'py, PyTuple>| py.import("numpy")?.call_method1("zeros", (of,));
+    let Some((total, room)) = total.and_then(|total| Some((total, total.checked_add(ALIGNMENT / size_of::<f64>())?)))
+    else {
+        return Ok(zeros(PyTuple::new(py, shape)?)?.cast_into()?);
+    };
+    let room = zeros(PyTuple::new(py, [room])?)?.cast_into::<PyArrayDyn<f64>>()?;
+    let skip = (room.data() as usize).wrapping_neg() % ALIGNMENT / size_of::<f64>();
+    let part = room.get_item(PySlice::new(py, skip as isize, (skip + total) as isize, 1))?;
+    Ok(part.call_method1("reshape", (PyTuple::new(py, shape)?,))?.cast_into()?)
 }
 
 /// The memory of an array for results.

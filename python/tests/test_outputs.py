@@ -171,8 +171,30 @@ def test_wrenches():
         multibody.load(MODELS / "ur5.urdf", wrenches=["nose"])
 
 
-def test_torch_takes_results(arm):
+def test_torch_takes_results_without_a_copy(arm):
     torch = pytest.importorskip("torch")
     q, v = states(arm, 2)
     p = arm.momenta(q, v)
-    assert (torch.from_dlpack(p).numpy() == p).all()
+    there = torch.from_dlpack(p)
+    assert (there.numpy() == p).all() and there.data_ptr() == p.ctypes.data
+
+
+def test_results_are_shared_and_aligned(arm):
+    """DLPack shares memory; JAX does so where it begins at a multiple of 64 bytes."""
+    for rows in (2, 100, 333):
+        q, v = states(arm, rows)
+        motion = arm.rollout((q, v), dt=1e-3, steps=3)
+        for array in (arm.momenta(q, v), arm.mass_matrix(q), motion.q, motion.v):
+            there = np.from_dlpack(array)
+            assert there.ctypes.data == array.ctypes.data
+            assert array.size < 512 or array.ctypes.data % 64 == 0
+            assert array.flags.c_contiguous and array.flags.writeable
+
+
+def test_jax_takes_results_without_a_copy(arm):
+    jax = pytest.importorskip("jax")
+    jax.config.update("jax_enable_x64", True)
+    q, v = states(arm, 100)
+    for array in (arm.momenta(q, v), arm.mass_matrix(q), arm.rollout((q, v), dt=1e-3, steps=3).q):
+        there = jax.dlpack.from_dlpack(array)
+        assert there.unsafe_buffer_pointer() == array.ctypes.data and (np.asarray(there) == array).all()
