@@ -26,7 +26,7 @@ for target in x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu; do
     fi
     other=()
     [ "$target" = "$host" ] || other=(--target "$target")
-    maturin build --profile wheel --locked --out dist "${other[@]}" "${zig[@]}"
+    maturin build --profile wheel --locked --compression-level 9 --out dist "${other[@]}" "${zig[@]}"
 done
 ls -l dist/*.whl
 exit $missing
