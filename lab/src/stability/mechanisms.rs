@@ -34,6 +34,7 @@ pub fn singular() -> Vec<Mechanism> {
         crank("unequal_masses", "The same with a rocker of 0.9 kg and a coupler of 0.1 kg.", unequal_masses()),
         crank("skew_axes", "The same with closing frames turned by 0.6 rad: no row vanishes, two become dependent.", skew_axes()),
         crank("two_parallelograms", "Two parallelograms: the rocker of the first is the crank of the second.", parallelograms(2)),
+        crank("redundant_crank", "A parallelogram with a third crank: one row follows from the others everywhere, and near the change point two more do nearly.", redundant_crank()),
         crank("singular_leg", "A Strandbeest leg whose lower loop has a change point: lower rod 0.631 m, link and foot 0.45 m, the pin of the link turned back by 20°.", singular_leg()),
         Mechanism {
             name: "stewart",
@@ -80,6 +81,26 @@ fn bar<'a>(name: &'a str, parent: Option<&'a str>, place: [f64; 3], length: f64,
     let across = mass * length * length / 12.0;
     let (com, inertia) = ([length / 2.0, 0.0, 0.0], [1e-5, across, across]);
     Link { name, parent, mass, com, inertia, place, axis: [0.0, -1.0, 0.0], damping: 0.0 }
+}
+
+/// A parallelogram whose coupler a third crank carries as well.
+fn redundant_crank() -> String {
+    let mut text = Text::new("redundant_crank", "A coupler on three equal cranks.", [0.0, 0.0, -9.81]);
+    let angle = 35.0_f64.to_radians();
+    text.link(&bar("crank", None, [0.0; 3], 0.2, 0.314));
+    text.start(angle, true);
+    text.link(&bar("coupler", Some("crank"), [0.2, 0.0, 0.0], 0.4, 0.628));
+    text.start(-angle, false);
+    let others = [("outer", 0.4), ("inner", 0.15)];
+    for (name, at) in others {
+        text.link(&bar(name, None, [at, 0.0, 0.0], 0.2, 0.314));
+        text.start(angle, false);
+    }
+    for (name, at) in others {
+        text.close(&format!("{name}_pin"), "revolute", [("coupler", [at, 0.0, 0.0]), (name, [0.2, 0.0, 0.0])]);
+        text.along([0.0, -1.0, 0.0]);
+    }
+    text.finish()
 }
 
 /// `n` parallelograms side by side: the rocker of each is the crank of the next.

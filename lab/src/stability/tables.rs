@@ -22,7 +22,7 @@ errs by more than 100 times the tolerance (relative to the largest kinetic energ
 same method loses on a smooth four-bar (`smooth`), and it does not say so; it is *refused* if it stops with an error. Of
 the others, `error` is the largest error of the energy, and `steps` the mean number of steps. `capped` counts runs that
 were given up after 640,000 evaluations of the rates. `positions` counts the singular positions
-that all runs together met or passed; `gradient` and `partition` compute no pivots and do not see those between two steps.
+that all runs together met or passed.
 ";
 
 /// Whether a list of names, which is empty for all, has a name.

@@ -14,13 +14,11 @@ pub(super) struct Basic<S> {
     bases: Vec<Basis<S>>,
     /// Rows that are not derivatives of conditions on positions.
     velocities: Vec<bool>,
+    /// Rows that the sweeps leave out.
+    left_out: Vec<bool>,
     /// For each block: dependent columns and the rows that are solved for them, a pair for each pivot.
     pub pairs: Vec<Vec<(usize, usize)>>,
     pub lus: Vec<Lu<S>>,
-    /// Number of independent rows of every block in the last solution.
-    ranks: Vec<usize>,
-    /// The same at the end of the last step.
-    noted: Vec<usize>,
     b: Vec<S>,
     x: Vec<S>,
     work: Vec<S>,
@@ -33,15 +31,22 @@ impl<S: Real> Basic<S> {
         let (m, n, mn) = (most(|b| b.rows.len()), most(|b| b.columns.len()), most(|b| b.a.len()));
         Basic {
             velocities: system.rows().iter().map(|row| !row.holonomic).collect(),
+            left_out: vec![false; system.rows().len()],
             bases: blocks.list.iter().map(|b| Basis::new(b.rows.len(), b.columns.len())).collect(),
             pairs: blocks.list.iter().map(|b| Vec::with_capacity(b.rows.len())).collect(),
             lus: blocks.list.iter().map(|b| Lu::new(b.rows.len())).collect(),
-            ranks: vec![0; blocks.list.len()],
-            noted: vec![0; blocks.list.len()],
             b: vec![S::zero(); m],
             x: vec![S::zero(); n],
             work: vec![S::zero(); mn],
             blocks,
+        }
+    }
+
+    /// Leaves out of displacements the rows that the sweeps leave out, which have pivots of zero: while the momenta are
+    /// free along a row, a displacement along it would change the energy.
+    pub fn leave_out(&mut self, pivots: &[S]) {
+        for (left_out, pivot) in self.left_out.iter_mut().zip(pivots) {
+            *left_out = *pivot == S::zero();
         }
     }
 
@@ -51,6 +56,7 @@ impl<S: Real> Basic<S> {
         self.blocks.fill(entries);
         self.blocks.hold(held);
         self.blocks.release(&self.velocities);
+        self.blocks.release(&self.left_out);
         self.solve_least(residual, dq)
     }
 
@@ -64,10 +70,9 @@ impl<S: Real> Basic<S> {
     fn solve_least(&mut self, residual: &[S], dq: &mut [S]) -> usize {
         dq.fill(S::zero());
         let mut rank = 0;
-        for (k, (block, basis)) in self.blocks.list.iter().zip(&mut self.bases).enumerate() {
+        for (block, basis) in self.blocks.list.iter().zip(&mut self.bases) {
             let (m, n) = (block.rows.len(), block.columns.len());
-            self.ranks[k] = basis.factor(&block.a, m, n);
-            rank += self.ranks[k];
+            rank += basis.factor(&block.a, m, n);
             for (b, r) in self.b.iter_mut().zip(&block.rows) {
                 *b = -residual[*r];
             }
@@ -115,26 +120,17 @@ impl<S: Real> Basic<S> {
         }
     }
 
-    /// The displacement of dependents alone, chosen anew; the rank of the rows.
-    pub fn dependent(&mut self, entries: &[S], residual: &[S], dq: &mut [S]) -> usize {
+    /// The displacement of dependents alone, chosen anew.
+    pub fn dependent(&mut self, entries: &[S], residual: &[S], dq: &mut [S]) {
         self.blocks.fill(entries);
+        self.blocks.release(&self.left_out);
         dq.fill(S::zero());
-        let rank = self.choose();
+        self.choose();
         for k in 0..self.pairs.len() {
-            self.ranks[k] = self.pairs[k].len();
             // Pivots were found: the factors exist.
             self.factor(k);
             self.solve(k, residual, dq);
         }
-        rank
-    }
-
-    /// Notes the ranks of the last solution at the end of a step. Returns the first row of the first block whose rank
-    /// has changed since the end of the step before.
-    pub fn note(&mut self) -> Option<usize> {
-        let changed = self.ranks.iter().zip(&self.noted).position(|(rank, before)| rank != before);
-        self.noted.copy_from_slice(&self.ranks);
-        self.blocks.list[changed?].rows.first().copied()
     }
 
     /// Takes `Φᵀ Φ_d⁻ᵀ f_d` off forces `f` of a factored block: nothing is left at its dependents.

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "alloc")]
 use super::basic::Basic;
+use super::nearness::Nearness;
 use super::projection::{finite, Room};
 use super::rows::{named, worst};
 use super::ConstraintError;
@@ -21,12 +22,23 @@ pub enum Stabilisation {
     /// ([`Constrained::position_correction`]), and momenta stay.
     #[default]
     Mass,
-    /// As `Mass`, with the displacement of least norm, `−Φᵀ(Φ Φᵀ)⁻¹φ`.
+    /// As `Mass`, with the displacement of least norm, `−Φᵀ(Φ Φᵀ)⁻¹φ`; near singular positions with that of `Mass`.
     #[cfg(feature = "alloc")]
     Gradient,
-    /// As `Mass`, with a displacement of dependent coordinates alone, which are chosen anew each time.
+    /// As `Mass`, with a displacement of dependent coordinates alone, which are chosen anew each time; near singular
+    /// positions with that of `Mass`.
     #[cfg(feature = "alloc")]
     Partition,
+}
+
+impl Stabilisation {
+    /// Whether the displacements are not those of the sweeps.
+    fn has_displacements(self) -> bool {
+        #[cfg(feature = "alloc")]
+        return matches!(self, Stabilisation::Gradient | Stabilisation::Partition);
+        #[cfg(not(feature = "alloc"))]
+        false
+    }
 }
 
 /// The residual at which positions count as closed, and the number of iterations.
@@ -93,6 +105,10 @@ pub(super) struct Corrector<Y: Constrained> {
     roots: [Y::Rows; 2],
     /// Number of singular positions, and the last one.
     pub singular: (u32, Option<SingularPosition>),
+    /// How near singular positions are.
+    pub nearness: Nearness<Y::Rows, Y::Scalar>,
+    /// Whether the last state was near one.
+    near: bool,
     #[cfg(feature = "alloc")]
     basic: Option<Basic<Y::Scalar>>,
 }
@@ -111,11 +127,10 @@ where
             noted: None,
             roots: [system.zero_rows(), system.zero_rows()],
             singular: (0, None),
+            nearness: Nearness::new(system.zero_rows()),
+            near: false,
             #[cfg(feature = "alloc")]
-            basic: match stabilisation {
-                Stabilisation::Gradient | Stabilisation::Partition => Some(Basic::new(system)),
-                _ => None,
-            },
+            basic: stabilisation.has_displacements().then(|| Basic::new(system)),
         }
     }
 
@@ -151,10 +166,6 @@ where
             // Only the ratio of the signs matters.
             (*older, *old) = if root < zero { (-*old, -root) } else { (*old, root) };
         }
-        #[cfg(feature = "alloc")]
-        if let Some(basic) = &mut self.basic {
-            left = basic.note();
-        }
         let event = match last {
             // Where the rank rises, the position has been noted already.
             Some(last) if last.rank < rank => None,
@@ -169,20 +180,32 @@ where
         self.noted = Some(Noted { t, step, rank });
     }
 
-    /// Computes the residuals, and the displacement that corrects them into `room.v`. Returns the number of independent
-    /// rows.
-    fn solve(&mut self, room: &mut Room<Y>, system: &mut Y, q: &Y::Coordinates) -> usize {
+    /// Computes the residuals, and the displacement that corrects them into `room.v`, in iteration `k`.
+    ///
+    /// Near a singular position it is that of the sweeps for all stabilisations: at a distance `s`, a residual `φ` takes
+    /// a displacement of `φ/s`, and those that are not normal to the motion have a part of that size along it, which
+    /// changes the energy at every step by what the forces do on it, with the same sign.
+    fn solve(&mut self, room: &mut Room<Y>, system: &mut Y, q: &Y::Coordinates, k: u32) {
+        let own = self.stabilisation.has_displacements();
+        if !own || k == 0 || self.near {
+            system.position_correction(q, &mut room.residual, &mut room.v, &mut room.pivots);
+            self.rank = room.pivots.as_ref().iter().filter(|pivot| **pivot != Y::Scalar::zero()).count();
+        }
+        if own && k == 0 {
+            self.near = self.nearness.near(room.pivots.as_ref());
+        }
         #[cfg(feature = "alloc")]
-        if let Some(basic) = &mut self.basic {
+        if let Some(basic) = self.basic.as_mut().filter(|_| !self.near) {
+            basic.leave_out(room.pivots.as_ref());
             system.constraint_residuals(q, &mut room.residual, &mut room.entries);
             let (residual, entries, dq) = (room.residual.as_ref(), room.entries.as_ref(), room.v.as_mut());
-            return match self.stabilisation {
-                Stabilisation::Gradient => basic.least(entries, &[], residual, dq),
+            match self.stabilisation {
+                Stabilisation::Gradient => {
+                    basic.least(entries, &[], residual, dq);
+                }
                 _ => basic.dependent(entries, residual, dq),
-            };
+            }
         }
-        system.position_correction(q, &mut room.residual, &mut room.v, &mut room.pivots);
-        room.pivots.as_ref().iter().filter(|pivot| **pivot != Y::Scalar::zero()).count()
     }
 
     /// Corrects positions until the residuals are small, and once more: a residual below the tolerance is removed too,
@@ -195,7 +218,7 @@ where
     ) -> Result<(), ConstraintError> {
         let Effort { iterations, tolerance, .. } = self.effort;
         for k in 0..iterations {
-            self.rank = self.solve(room, system, q);
+            self.solve(room, system, q, k);
             let (at, size) = worst(room.residual.as_ref());
             if k == 0 {
                 self.found = size;

@@ -5,8 +5,8 @@
 //! | [`Stabilisation::None`] | `σ` accumulates | drift | nothing |
 //! | [`Stabilisation::Momenta`] | projected | drift, by the method's error | one solve |
 //! | [`Stabilisation::Mass`] | projected | closed | one solve, and one for each iteration and for the last residuals |
-//! | `Stabilisation::Gradient` | projected | closed | one solve, `Φ` and a small QR for each iteration |
-//! | `Stabilisation::Partition` | projected | closed | one solve, `Φ` and a small LU for each iteration |
+//! | `Stabilisation::Gradient` | projected | closed | two solves, `Φ` and a small QR for each iteration |
+//! | `Stabilisation::Partition` | projected | closed | two solves, `Φ` and a small LU for each iteration |
 //! | `CoordinatePartition` with `Repartition` | gauge `p_dep = 0` | closed at every evaluation | two to four times `Φ` and a small LU at every evaluation, three more at the end |
 //! | [`Rattle`] | projected | closed | within the step: 6 to 13 iterations of 3 open evaluations and 3 sweeps |
 //! | [`RadauIndex2`] | projected | drift | within the step: 10 to 20 iterations of 3 open evaluations and 3 projections |
@@ -19,9 +19,9 @@
 //!
 //! Methods that remember rates of past steps keep their multipliers `σ`, as their history requires.
 //! [`Stabilisation::Mass`] is the general choice: it costs little, and it keeps the energy when a mechanism passes a
-//! singular position. The end of a step that would change the kinetic energy by more than [`Effort::energy`] is refused:
-//! this comparison takes one solve more, and three with [`Stabilisation::None`] and [`Stabilisation::Momenta`], which do
-//! not close the positions otherwise.
+//! singular position; near one, `Gradient` and `Partition` correct positions as it does. The end of a step that would
+//! change the kinetic energy by more than [`Effort::energy`] is refused: this comparison takes one solve more, and three
+//! with [`Stabilisation::None`] and [`Stabilisation::Momenta`], which do not close the positions otherwise.
 //!
 //! The functions `close` and `complete` compute consistent initial states.
 

@@ -22,20 +22,33 @@ impl<R: AsRef<[S]> + AsMut<[S]>, S: Real> Nearness<R, S> {
         Nearness { largest: zero, rank: 0, freed: S::one() }
     }
 
-    /// Whether the momenta must be freed at these pivots.
-    pub fn asks(&mut self, pivots: &[S]) -> bool {
-        let zero = S::zero();
-        let rank = pivots.iter().filter(|pivot| **pivot != zero).count();
-        let mut least = S::one();
+    /// The least part that a row has of its largest pivot so far: of the rows that are independent, and of all.
+    fn least(&mut self, pivots: &[S]) -> [S; 2] {
+        let (zero, mut least) = (S::zero(), [S::one(); 2]);
         for (pivot, largest) in pivots.iter().zip(self.largest.as_mut()) {
             if *pivot > *largest {
                 *largest = *pivot;
             }
-            if *pivot != zero && *pivot < least * *largest {
-                least = *pivot / *largest;
+            let of = usize::from(*pivot == zero);
+            if *pivot < least[of] * *largest {
+                least[of] = *pivot / *largest;
             }
         }
-        let step = S::constant(Self::STEP);
+        if least[0] < least[1] {
+            least[1] = least[0];
+        }
+        least
+    }
+
+    /// Whether a row has lost nearly all of its pivot, or has been left out since.
+    pub fn near(&mut self, pivots: &[S]) -> bool {
+        self.least(pivots)[1] < S::constant(Self::STEP)
+    }
+
+    /// Whether the momenta must be freed at these pivots.
+    pub fn asks(&mut self, pivots: &[S]) -> bool {
+        let rank = pivots.iter().filter(|pivot| **pivot != S::zero()).count();
+        let ([least, _], step) = (self.least(pivots), S::constant(Self::STEP));
         let asks = (rank != self.rank && self.rank > 0) || least < step * self.freed;
         self.rank = rank;
         if asks {

@@ -1,7 +1,6 @@
 //! Projection of states onto the constraints at the ends of steps.
 
 use super::correction::{Corrector, Effort, SingularPosition, Stabilisation};
-use super::nearness::Nearness;
 use super::post_step::PostStep;
 use super::rows::{add_forces, named, worst};
 use super::ConstraintError;
@@ -138,7 +137,6 @@ pub struct ToTolerance<Y: Constrained> {
     sigma: Y::Rows,
     /// Whether the last end of a step has given multipliers back.
     gave_back: bool,
-    nearness: Nearness<Y::Rows, Y::Scalar>,
 }
 
 /// What corrections would take from the kinetic energy, at the ends of the last two steps.
@@ -189,7 +187,6 @@ where
             p: system.zero_momenta(),
             sigma: system.zero_rows(),
             gave_back: false,
-            nearness: Nearness::new(system.zero_rows()),
         };
         Projection { room: Room::new(system), policy }
     }
@@ -210,9 +207,7 @@ where
         self.policy.corrector.noted()
     }
 
-    /// Number of singular positions that the ends of steps have met or passed, and the last one. Positions that a step
-    /// leads past are found by the stabilisations that compute pivots: not by [`Stabilisation::Gradient`] and
-    /// [`Stabilisation::Partition`].
+    /// Number of singular positions that the ends of steps have met or passed, and the last one.
     pub fn singular_positions(&self) -> (u32, Option<SingularPosition>) {
         self.policy.corrector.singular
     }
@@ -328,11 +323,7 @@ where
         if !self.gave_back {
             return Ok(false);
         }
-        if !matches!(self.corrector.stabilisation, Stabilisation::Mass) {
-            // The others compute no pivots.
-            system.position_correction(q, &mut room.residual, &mut room.v, &mut room.pivots);
-        }
-        if !self.nearness.asks(room.pivots.as_ref()) {
+        if !self.corrector.nearness.asks(room.pivots.as_ref()) {
             return Ok(false);
         }
         system.project_momenta(t, q, p, &mut room.v, &mut room.sigma);

