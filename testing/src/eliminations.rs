@@ -3,7 +3,7 @@
 
 use mbd_codegen::model::Model;
 use mbd_codegen::options::{EliminationStrategy, PlanOptions, RolledCode, DEFAULT_SNAP};
-use mbd_codegen::plan::{parallel_runs, tip_chains, ChainElimination, Plan};
+use mbd_codegen::plan::{chains, has_rows, parallel_runs, ChainElimination, Plan};
 use mbd_codegen::search;
 
 use crate::random::Rng;
@@ -40,9 +40,17 @@ fn eliminated(single: &Plan, rng: &mut Rng) -> Plan {
         let non_rotating = rng.chance(0.5);
         run.iter().for_each(|&i| plan.nodes[i].elimination.non_rotating = non_rotating);
     }
-    for chain in tip_chains(single) {
-        let from_ground = plan.nodes[chain[0]].parent.is_none();
-        random_chain(chain.len(), from_ground, rng).apply(&mut plan, &chain);
+    for chain in chains(single) {
+        let parent = plan.nodes[chain[0]].parent;
+        let passes = parent.is_some_and(|p| !has_rows(single, p)) && rng.chance(0.2);
+        let elimination = match passes {
+            true => ChainElimination {
+                before_joint: before_joint(chain.len(), rng),
+                ..ChainElimination::passing(chain.len(), false)
+            },
+            false => random_chain(chain.len(), parent.is_none(), rng),
+        };
+        elimination.apply(&mut plan, &chain);
     }
     let accumulates = rng.chance(0.5);
     for i in single.constraints.iter().flat_map(|c| c.cycle()) {
@@ -62,6 +70,11 @@ fn random_chain(len: usize, from_ground: bool, rng: &mut Rng) -> ChainEliminatio
         _ => 0,
     };
     let accumulating = split + rng.below(len - split + 1);
-    let before_joint = (0..len).map(|_| rng.chance(0.5)).collect();
-    ChainElimination { split, base, before_joint, accumulating, rolled: false }
+    let before_joint = before_joint(len, rng);
+    ChainElimination { split, base, before_joint, accumulating, ..ChainElimination::single(len) }
+}
+
+/// Whether each of `len` joints is eliminated before its own motion.
+fn before_joint(len: usize, rng: &mut Rng) -> Vec<bool> {
+    (0..len).map(|_| rng.chance(0.5)).collect()
 }

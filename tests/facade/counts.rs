@@ -136,9 +136,11 @@ fn a_general_quadruped_stays_below_the_best_known() {
 #[test]
 fn real_robots_stay_below_the_best_known() {
     type Row = (&'static str, Base, [Option<usize>; 2], [[usize; 2]; 2]);
-    let rows: [Row; 9] = [
+    let rows: [Row; 10] = [
         ("ur5.urdf", Base::Fixed, [Some(417), Some(438)], [[240, 237], [249, 245]]),
         ("panda_arm.urdf", Base::Fixed, [Some(823), Some(877)], [[819, 812], [869, 861]]),
+        // One coordinate moves both fingers.
+        ("panda.urdf", Base::Fixed, [None; 2], [[885, 850], [934, 892]]),
         ("iiwa14.urdf", Base::Fixed, [None; 2], [[579, 567], [645, 634]]),
         // Fast arithmetic repeats shared products where the longest path waits for them.
         ("chain10_planar.toml", Base::Fixed, [Some(498), Some(647)], [[466, 466], [496, 495]]),
@@ -162,6 +164,7 @@ fn what_is_generated_by_default_stays_below_its_limits() {
     for (name, base, limits) in [
         ("ur5.urdf", Base::Fixed, [262, 274]),
         ("panda_arm.urdf", Base::Fixed, [871, 864]),
+        ("panda.urdf", Base::Fixed, [936, 900]),
         ("iiwa14.urdf", Base::Fixed, [649, 637]),
         ("chain6.toml", Base::Fixed, [1135, 1120]),
         ("chain10_planar.toml", Base::Fixed, [888, 908]),

@@ -55,6 +55,15 @@ impl Plan {
         };
         let number = |x: f64| value(&Value::Const(x));
         let mut letters = String::new();
+        // Numbers of the unknowns in the order in which they are met.
+        let mut met: Vec<usize> = Vec::new();
+        let mut place = |g: &usize| {
+            let k = met.iter().position(|other| other == g);
+            k.unwrap_or_else(|| {
+                met.push(*g);
+                met.len() - 1
+            })
+        };
         for node in &self.nodes {
             letters.push_str(&format!("|{:?} {:?} {}: ", node.parent, discriminant(&node.kind), node.quarter));
             for step in &node.place {
@@ -80,7 +89,8 @@ impl Plan {
                 number(node.slide),
                 node.variable.len(),
                 node.follow.len(),
-                [&elimination.open, &elimination.solve_before, &elimination.solve_after],
+                [&elimination.open, &elimination.solve_before, &elimination.solve_after]
+                    .map(|list| list.iter().map(&mut place).collect::<Vec<usize>>()),
             ));
         }
         letters.extend(self.wrenches.iter().map(|_| 'w'));

@@ -1,5 +1,6 @@
 //! Elimination of a chain of joints with one degree of freedom each: which are eliminated one by one, which together,
-//! and where.
+//! and where. Columns that arrive from beyond the chain, of shared coordinates and of other chains, go the way of the
+//! last joint's own.
 
 use mbd_runtime::tree::{Source, Unknown};
 
@@ -14,6 +15,8 @@ pub struct ChainElimination {
     /// Joints from this one on are solved together: at `base`, or with those before `split` where the two meet. The
     /// number of the last joint means that there is no block.
     pub base: usize,
+    /// All joints are solved further inward: at the parent of the first, or where its columns go; `base` is 0 then.
+    pub passes: bool,
     /// For every joint, whether it is eliminated before its own motion.
     pub before_joint: Vec<bool>,
     /// Joints before this one get their momentum rates from accumulated momenta.
@@ -23,10 +26,22 @@ pub struct ChainElimination {
 }
 
 impl ChainElimination {
+    /// The elimination of a chain of `len` joints one by one.
+    pub fn single(len: usize) -> ChainElimination {
+        let before_joint = vec![false; len];
+        ChainElimination { split: 0, base: len - 1, passes: false, before_joint, accumulating: 0, rolled: false }
+    }
+
+    /// The elimination of a chain of `len` joints at the parent of the first, or where its columns go; each column is
+    /// begun before the joint's motion if `before`.
+    pub fn passing(len: usize, before: bool) -> ChainElimination {
+        ChainElimination { base: 0, passes: true, before_joint: vec![before; len], ..ChainElimination::single(len) }
+    }
+
     /// The elimination of a chain of `len` joints in rolled code: one joint at a time, before its motion, which has the
     /// shortest critical path through a link.
     pub fn rolled(len: usize) -> ChainElimination {
-        ChainElimination { split: 0, base: len - 1, before_joint: vec![true; len], accumulating: 0, rolled: true }
+        ChainElimination { before_joint: vec![true; len], rolled: true, ..ChainElimination::single(len) }
     }
 
     /// Description for a chain of `len` joints.
@@ -38,6 +53,7 @@ impl ChainElimination {
         let met = self.split == self.base && self.split > 0;
         match (met, len - self.base) {
             (true, k) => words.push(format!("all at the ground: {} screws out, {k} columns in", self.split)),
+            _ if self.passes => words.push("all at the parent".to_string()),
             (false, 1) if self.split == 0 => words.push("one by one".to_string()),
             (false, 1) => {}
             (false, k) => words.push(format!("last {k} together")),
@@ -56,7 +72,7 @@ impl ChainElimination {
     }
 
     /// Eliminates the freedoms of a chain in this way. `chain` has the nodes of `plan`, inner joint first; each
-    /// eliminates its freedom by itself so far.
+    /// eliminates its freedom by itself so far. Chains beyond it have been eliminated.
     pub fn apply(&self, plan: &mut Plan, chain: &[usize]) {
         for (&i, &before_joint) in chain.iter().zip(&self.before_joint) {
             let node = &mut plan.nodes[i];
@@ -68,19 +84,22 @@ impl ChainElimination {
             plan.nodes[i].elimination.accumulates_momentum = true;
         }
         let met = self.split == self.base && self.split > 0;
-        let first = if met { self.base } else { self.base + 1 };
+        let first = if met || self.passes { self.base } else { self.base + 1 };
         for k in (first..chain.len()).rev() {
-            let Some(g) = defer(plan, chain[k]) else { continue };
-            for &j in &chain[first.max(self.base + 1)..=k] {
-                plan.nodes[j].elimination.open.push(g);
+            let i = chain[k];
+            let mut columns = std::mem::take(&mut plan.nodes[i].elimination.solve_before);
+            columns.append(&mut plan.nodes[i].elimination.solve_after);
+            columns.extend(defer(plan, i));
+            if met && k == self.base {
+                plan.solve_at_ground.extend(&columns);
+                plan.nodes[i].elimination.ends.append(&mut columns);
+                continue;
             }
-            let base = &mut plan.nodes[chain[self.base]].elimination;
-            if met {
-                base.ends.push(g);
-                plan.solve_at_ground.push(g);
-            } else {
-                base.solve_before.push(g);
+            match plan.nodes[i].parent {
+                Some(parent) => plan.nodes[parent].elimination.solve_before.extend(&columns),
+                None => plan.solve_at_ground.extend(&columns),
             }
+            plan.nodes[i].elimination.open.append(&mut columns);
         }
         for k in (0..self.split).rev() {
             let Some(g) = defer(plan, chain[k]) else { continue };
@@ -95,8 +114,11 @@ impl ChainElimination {
 }
 
 /// Defers the degree of freedom of node `i`, which is then solved closer to the ground. Returns its number among the
-/// unknowns.
+/// unknowns; nothing if the node has no coordinate of its own.
 fn defer(plan: &mut Plan, i: usize) -> Option<usize> {
+    if plan.nodes[i].elimination.unknown.is_some() {
+        return None;
+    }
     let Source::State { v, .. } = plan.nodes[i].source else { return None };
     let g = plan.unknowns.len();
     plan.unknowns.push(Unknown::Velocity(v));

@@ -18,7 +18,7 @@ pub mod state_layout;
 mod structure;
 
 pub use chain::ChainElimination;
+pub use paths::{chains, has_rows, parallel_runs};
 pub(crate) use paths::{is_single_but_for_rows, touches_rolled, unbranched_paths};
-pub use paths::{parallel_runs, tip_chains};
 pub use rigid::Rigid;
 pub use structure::{Plan, PlanBond, PlanConstraint, PlanFrame, PlanNode, PoseStep, RowsThatAct, Slot};

@@ -1,7 +1,6 @@
-//! Paths of the tree that are eliminated or rolled together: chains to the tips, unbranched paths, runs of parallel
-//! joints.
+//! Paths of the tree that are eliminated or rolled together: chains, unbranched paths, runs of parallel joints.
 
-use mbd_runtime::tree::{Kind, Source, Unknown};
+use mbd_runtime::tree::{Elimination, Kind, Source, Unknown};
 
 use super::structure::{Plan, PlanNode, PoseStep};
 
@@ -30,18 +29,47 @@ pub fn is_single_but_for_rows(plan: &Plan, i: usize) -> bool {
     is_single(&node)
 }
 
-/// Runs of single-freedom joints that end at a tip, inner joint first.
-pub fn tip_chains(plan: &Plan) -> Vec<Vec<usize>> {
+/// Whether a row of a constraint passes through node `i` or is solved there.
+pub fn has_rows(plan: &Plan, i: usize) -> bool {
+    let Elimination { open, solve_before, solve_after, ends, .. } = &plan.nodes[i].elimination;
+    let mut columns = [open, solve_before, solve_after, ends].into_iter().flatten();
+    columns.any(|&g| matches!(plan.unknowns[g], Unknown::Row(_)))
+}
+
+/// Unbranched paths of single-freedom joints, inner joint first, that are eliminated as chains. No row of a constraint
+/// passes through them. They are as long as
+/// possible, and each has a coordinate that it can solve. Those at the tips come first, in the order of the nodes;
+/// every other chain comes after those beyond it.
+pub fn chains(plan: &Plan) -> Vec<Vec<usize>> {
     let children = children(plan);
-    let single = |i: usize| is_single(&plan.nodes[i]);
-    let tips = (0..plan.nodes.len()).filter(|&i| children[i] == 0 && single(i));
-    tips.map(|tip| {
-        let inward = |&i: &usize| plan.nodes[i].parent.filter(|&p| children[p] == 1 && single(p));
-        let mut chain: Vec<usize> = std::iter::successors(Some(tip), inward).collect();
-        chain.reverse();
-        chain
-    })
-    .collect()
+    let inside: Vec<bool> = (0..plan.nodes.len()).map(|i| plan.nodes[i].kind.nv() == 1 && !has_rows(plan, i)).collect();
+    let mut all: Vec<Vec<usize>> = Vec::new();
+    for i in (0..plan.nodes.len()).filter(|&i| inside[i]) {
+        let inner = plan.nodes[i].parent.filter(|&p| inside[p] && children[p] == 1);
+        match all.iter_mut().find(|chain| inner.is_some() && chain.last().copied() == inner) {
+            Some(chain) => chain.push(i),
+            None => all.push(vec![i]),
+        }
+    }
+    let solves = |i: usize| {
+        let elimination = &plan.nodes[i].elimination;
+        let own = elimination.unknown.is_none() && matches!(plan.nodes[i].source, Source::State { .. });
+        own || !elimination.solve_before.is_empty() || !elimination.solve_after.is_empty()
+    };
+    all.retain(|chain| chain.iter().any(|&i| solves(i)));
+    // Number of chains beyond each, on the longest way to a tip.
+    let mut beyond = vec![0; all.len()];
+    for k in (0..all.len()).rev() {
+        let way = plan.ancestors(all[k][0]);
+        for (j, chain) in all[..k].iter().enumerate() {
+            if way.contains(&chain[chain.len() - 1]) {
+                beyond[j] = beyond[j].max(beyond[k] + 1);
+            }
+        }
+    }
+    let mut order: Vec<usize> = (0..all.len()).collect();
+    order.sort_by_key(|&k| beyond[k]);
+    order.into_iter().map(|k| all[k].clone()).collect()
 }
 
 /// Paths of at least `least` nodes without branches, each node with coordinates of its own, inner node first.

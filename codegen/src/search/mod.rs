@@ -7,8 +7,8 @@
 //! the inner joints can also send their screws outward to meet those columns half-way. A joint can be eliminated before
 //! its own motion, so that the division does not wait for its rotation. Momentum rates come from quadratic forms or
 //! from accumulated momenta. Frames between parallel joints need not rotate. The best choice depends on the zeros of
-//! the model. Candidates are therefore generated and counted, branch by branch, and a candidate is refused if its
-//! rounding errors are much larger than those of one joint at a time.
+//! the model. Candidates are therefore generated and counted, chain by chain from the tips to the root, and a candidate is
+//! refused if its rounding errors are much larger than those of one joint at a time.
 
 mod branches;
 mod chain;

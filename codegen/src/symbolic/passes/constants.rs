@@ -1,7 +1,9 @@
 //! Collects constant factors: `c·(d·x)` becomes `(c·d)·x`, even where `d·x` is needed elsewhere too. The number of
-//! operations does not grow, and the critical path has one product less.
+//! operations does not grow, and the critical path has one product less. Doubles that no sum can fuse become sums, which
+//! take less time.
 
-use super::rebuild::Rebuilt;
+use super::rebuild::{uses, Rebuilt};
+use super::terms::Opened;
 use crate::symbolic::{Expr, Graph, Op, Operand, Program};
 
 /// Collects the constant factors of products.
@@ -12,6 +14,26 @@ pub fn gather(program: &Program) -> Program {
         new.at(*label);
         let value = match *op {
             Op::Mul(a, b) => product(&new, a, b),
+            op => new.copy(op),
+        };
+        new.set(*id, value);
+    }
+    doubled(&new.finish(program))
+}
+
+/// `2·x` as `x + x` outside sums, unless `x` is a part of it that regrouping may split.
+fn doubled(program: &Program) -> Program {
+    let (graph, opened, uses) = (Graph::default(), Opened::new(program), uses(program));
+    let mut new = Rebuilt::new(&graph, program);
+    for (id, op, label) in &program.steps {
+        new.at(*label);
+        let value = match *op {
+            Op::Mul(Operand::Const(bits), Operand::Node(x))
+                if f64::from_bits(bits) == 2.0 && !opened.in_sum[*id as usize] && uses[x as usize] > 1 =>
+            {
+                let x = new.get(Operand::Node(x));
+                x + x
+            }
             op => new.copy(op),
         };
         new.set(*id, value);
@@ -41,6 +63,15 @@ mod tests {
         let gathered = gather(&program);
         assert_eq!(gathered.counts().multiplications, 2);
         assert_eq!(gathered.evaluate(&[3.0], |a: f64, b: f64, c: f64| a * b + c), [7.5, -30.0, 3.0]);
+    }
+
+    #[test]
+    fn doubles_are_sums_where_nothing_fuses_them() {
+        let graph = Graph::default();
+        let x = graph.input(0) * graph.input(1);
+        let double = Expr::Const(2.0) * x;
+        let gathered = gather(&Program::new(&graph, &[x, double * graph.input(1), Expr::Const(0.7) * double]));
+        assert_eq!((gathered.counts().additions, gathered.counts().multiplications), (1, 3));
     }
 
     #[test]

@@ -12,6 +12,8 @@ pub mod shorten;
 pub mod sums;
 pub(super) mod terms;
 
+use std::cell::Cell;
+
 use super::Program;
 use schedule::Limits;
 
@@ -45,18 +47,15 @@ pub enum Rewrite {
 
 /// The program as it is to be emitted.
 pub fn run(program: Program, rewrite: Rewrite) -> Program {
-    let program = match rewrite {
-        Rewrite::None => return program,
-        Rewrite::Shortest => shorten::regroup_short(&constants::gather(&fewer(program))),
-        Rewrite::Fewest => {
-            let program = fewer(program);
-            let [a, b] = [sums::regroup(&constants::gather(&program)), sums::regroup(&program)];
-            if a.counts().total() <= b.counts().total() {
-                a
-            } else {
-                b
-            }
-        }
+    if rewrite == Rewrite::None {
+        return program;
+    }
+    let (collected, plain) = with_fewer(program);
+    let program = match plain {
+        // Long programs take too long to finish twice, and an operation is nothing to them.
+        Some(plain) if plain.steps.len() < LONG => fewest(finished(collected, rewrite), finished(plain, rewrite)),
+        Some(plain) => finished(fewest(collected, plain), rewrite),
+        None => finished(collected, rewrite),
     };
     let wide = program.throughput() >= WIDE * f64::from(program.critical_path());
     match wide && program.instructions() >= LONG {
@@ -65,10 +64,42 @@ pub fn run(program: Program, rewrite: Rewrite) -> Program {
     }
 }
 
+/// A program with fewer operations, regrouped.
+fn finished(program: Program, rewrite: Rewrite) -> Program {
+    match rewrite {
+        Rewrite::None => program,
+        Rewrite::Shortest => shorten::regroup_short(&constants::gather(&program)),
+        Rewrite::Fewest => fewest(sums::regroup(&constants::gather(&program)), sums::regroup(&program)),
+    }
+}
+
+/// The program with fewer operations; among equals the first.
+fn fewest(a: Program, b: Program) -> Program {
+    match a.counts().total() <= b.counts().total() {
+        true => a,
+        false => b,
+    }
+}
+
 /// Reduces the number of operations: takes out common factors and common pairs in turn, until neither saves any.
-pub fn fewer(mut program: Program) -> Program {
+pub fn fewer(program: Program) -> Program {
+    match with_fewer(program) {
+        (collected, Some(plain)) => fewest(collected, plain),
+        (collected, None) => collected,
+    }
+}
+
+/// [`fewer`] with equal terms collected and, if there are any, without: then a pair may be gone that other sums would
+/// have shared.
+fn with_fewer(program: Program) -> (Program, Option<Program>) {
+    let collects = Cell::new(false);
+    let collected = rounds(program.clone(), Some(&collects));
+    (collected, collects.get().then(|| rounds(program, None)))
+}
+
+fn rounds(mut program: Program, collects: Option<&Cell<bool>>) -> Program {
     for _ in 0..ROUNDS {
-        let next = share::share(&factor::factor(&program));
+        let next = share::share(&factor::factor(&program, collects));
         if next.counts().total() >= program.counts().total() {
             break;
         }
