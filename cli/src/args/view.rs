@@ -27,7 +27,7 @@ pub struct ViewArgs {
     /// Put a floor at this height that the collision shapes of a URDF or the geoms of an MJCF model touch, m
     #[arg(long, value_name = "Z", allow_hyphen_values = true, value_parser = finite)]
     pub floor: Option<f64>,
-    /// File to write; `-` for standard output [default: the name of the model, .html]
+    /// File to write; `-` for standard output [default: that of the model, with .html]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Write the motion as glTF 2.0 for other viewers instead: `.gltf`, or `.glb` in binary form

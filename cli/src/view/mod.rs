@@ -85,9 +85,10 @@ impl Given {
         Ok(Given { title: Some(model.name), name: Some(name), files, floating, floor: args.floor })
     }
 
-    /// Name of the page's file where none is given.
+    /// Name of the page's file where none is given: that of the description.
     fn file_name(&self) -> String {
-        format!("{}.html", self.title.as_deref().unwrap_or("mbd-view"))
+        let stem = Path::new(self.name.as_deref().unwrap_or("mbd-view")).file_stem().unwrap_or_default();
+        format!("{}.html", stem.to_string_lossy())
     }
 
     /// What the page's script reads.

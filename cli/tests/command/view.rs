@@ -27,7 +27,7 @@ fn one_small_file_without_requests() {
     let given: serde_json::Value = serde_json::from_str(script(&page, "given")).expect("JSON");
     assert_eq!(given["name"], "g1.urdf");
     assert_eq!(given["options"]["floating"], true);
-    assert!(page.contains("<title>g1 · mbd view</title>"));
+    assert!(page.contains("<title>g1_29dof_rev_1_0 · mbd view</title>"));
     // Every place of the template is filled.
     for place in ["@TITLE@", "@STYLE@", "@GIVEN@", "@WASM@", "@SCRIPT@"] {
         assert!(!page.contains(place), "{place}");
@@ -68,7 +68,49 @@ fn what_cannot_be_written_is_told() {
     bad(run_in(&folder, &["view", "model.tml"]), &["cannot read `model.tml`", "model.toml"]);
     bad(run_in(&folder, &["view", "model.toml", "-o", "none/page.html"]), &["cannot write `none/page.html`"]);
     std::fs::write(folder.join("broken.toml"), "[[body]]\nname = 'a'\n").expect("a file");
-    bad(run_in(&folder, &["view", "broken.toml"]), &["broken.toml:1:"]);
+    bad(run_in(&folder, &["view", "broken.toml"]), &["broken.toml:2:8: error"]);
     bad(run_in(&folder, &["view", "model.toml", "--gravity", "0,0,1"]), &["--gravity", "mbd convert"]);
     assert_eq!(files(&folder), ["broken.toml", "model.toml"]);
+}
+
+/// The JSON of a document of glTF, and its buffer.
+fn glb(bytes: &[u8]) -> (serde_json::Value, &[u8]) {
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes")) as usize;
+    assert_eq!((&bytes[..4], word(4), word(8)), (&b"glTF"[..], 2, bytes.len()));
+    let json = serde_json::from_slice(&bytes[20..20 + word(12)]).expect("JSON");
+    (json, &bytes[20 + word(12) + 8..])
+}
+
+#[test]
+fn motions_for_other_viewers() {
+    let folder = folder("view_gltf");
+    let model = format!("{ROOT}/models/mechanisms/fourbar.toml");
+    good(run_in(&folder, &["view", &model, "--gltf", "fourbar.glb", "--time", "0.5"]));
+    good(run_in(&folder, &["view", &model, "--gltf", "fourbar.gltf", "--time", "0.5"]));
+    let bytes = std::fs::read(folder.join("fourbar.glb")).expect("a file");
+    let (json, buffer) = glb(&bytes);
+    let text = std::fs::read_to_string(folder.join("fourbar.gltf")).expect("a file");
+    let other: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!(json["nodes"], other["nodes"]);
+    assert_eq!(json["buffers"][0]["byteLength"], buffer.len());
+    let list = |name: &str| json[name].as_array().expect("a list").clone();
+    for accessor in list("accessors") {
+        let view = &list("bufferViews")[accessor["bufferView"].as_u64().expect("an index") as usize];
+        let width = match accessor["type"].as_str() {
+            Some("SCALAR") => 1,
+            Some("VEC3") => 3,
+            Some("VEC4") => 4,
+            other => panic!("{other:?}"),
+        };
+        assert_eq!(view["byteLength"].as_u64(), accessor["count"].as_u64().map(|n| 4 * width * n));
+        assert!(view["byteOffset"].as_u64() < Some(buffer.len() as u64));
+    }
+    // Three bodies turn; each has places and rotations at sixteen instants.
+    let animation = &list("animations")[0];
+    let samplers = animation["samplers"].as_array().expect("samplers");
+    assert!(samplers.len() >= 6, "{samplers:?}");
+    let input = samplers[0]["input"].as_u64().expect("an index") as usize;
+    assert_eq!(list("accessors")[input]["count"], 16);
+    assert_eq!(list("accessors")[input]["max"][0], 0.5);
+    bad(run_in(&folder, &["view", &model, "--gltf", "fourbar.obj"]), &["neither `.gltf` nor `.glb`"]);
 }
