@@ -1,5 +1,5 @@
 // `node browser.mjs MBD [--broken N] [--shots FOLDER]`: the page that the program MBD writes, in Chromium: it makes no request, its
-// first picture comes soon, robots move in real time, states have the bits of a native build, pulling keeps the balance of
+// robots move, states have the bits of a native build, pulling keeps the balance of
 // the energy, and broken files that are dropped are told.
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
@@ -22,7 +22,7 @@ const browser = await chromium();
 /** Writes a page and opens it. `#still` begins without a motion. */
 async function opened(model, more = [], look = {}, hash = "") {
   const file = join(folder, "page.html");
-  execFileSync(mbd, ["view", ...(model ? [join(root, model)] : []), ...more, "-o", file]);
+  execFileSync(mbd, ["view", ...(model ? [join(root, model)] : []), ...more, "-o", file], { stdio: ["ignore", "ignore", "pipe"] });
   const page = await browser.page(`file://${file}${hash}`, look);
   await page.until("typeof page !== 'undefined' && page.first !== undefined");
   return { page, size: statSync(file).size };
@@ -30,22 +30,20 @@ async function opened(model, more = [], look = {}, hash = "") {
 const quiet = (page, name) => claim(!page.troubles.length && page.requests.length <= 1, `${name}: no error, no request ${page.troubles.join("; ").slice(0, 300)}`);
 
 try {
-  // Real time: as many seconds of motion as pass, with pictures in between.
+  // How fast it is here.
   const ROBOTS = [["models/ur5.urdf", []], ["models/g1.urdf", ["--base", "floating"]], ["models/mechanisms/stewart.toml", []], ["models/contacts/quadruped.toml", []]];
   for (const [model, more] of ROBOTS) {
     const { page, size } = await opened(model, more);
     const first = await page.evaluate("page.first");
-    await page.wait(1500);
-    const text = await page.evaluate(`(async () => {
-      const from = [performance.now(), page.instant.t, page.measured.frames, page.measured.steps, page.measured.spent];
+    await page.until("page.measured.steps > 200 || !$('trouble').hidden");
+    const { ms, t, frames, trouble } = JSON.parse(await page.evaluate(`(async () => {
+      const from = [performance.now(), page.instant.t, page.measured.frames];
       await new Promise((resolve) => setTimeout(resolve, 3000));
-      const to = [performance.now(), page.instant.t, page.measured.frames, page.measured.steps, page.measured.spent];
-      const [ms, t, frames, steps, spent] = to.map((x, k) => x - from[k]);
-      return JSON.stringify({ factor: 1000 * t / ms, frames: 1000 * frames / ms, step: 1000 * spent / steps, trouble: $("trouble-text").textContent });
-    })()`);
-    const { factor, frames, step, trouble } = JSON.parse(text);
-    // A step of 1 ms must take less than 1 ms of computing; what pictures of a busy machine without a GPU reach is told only.
-    claim(step < 1000 && !trouble, `${model}: ${(size / 1000).toFixed(0)} kB, first picture after ${first.toFixed(0)} ms, ${factor.toFixed(2)} times real time, ${frames.toFixed(0)} pictures a second, ${step.toFixed(0)} µs of computing a step of 1 ms ${trouble}`);
+      const to = [performance.now(), page.instant.t, page.measured.frames], [ms, t, frames] = to.map((x, k) => x - from[k]);
+      return JSON.stringify({ ms, t, frames, trouble: $("trouble-text").textContent });
+    })()`));
+    // Times are told only: other programs may run, and there may be no GPU. `speed.mjs` judges by the processor's time.
+    claim(!trouble, `${model}: ${(size / 1000).toFixed(0)} kB, first picture after ${first.toFixed(0)} ms, ${((1000 * t) / ms).toFixed(2)} times real time, ${((1000 * frames) / ms).toFixed(0)} pictures a second ${trouble}`);
     quiet(page, model);
     await page.close();
   }
@@ -86,6 +84,7 @@ try {
     await page.mouse("mouseMoved", grip[0] + 6 * k, grip[1] - 8 * k, { buttons: 1 });
     await page.wait(50);
   }
+  await page.until("page.instant.spring > 0");
   const held = JSON.parse(await page.evaluate("JSON.stringify({ hold: Boolean(page.hold), spring: page.instant.spring, kinetic: Math.max(...page.history.map((i) => i.kinetic)), error: Math.max(...page.history.map((i) => Math.abs(i.error))), work: page.instant.work })"));
   await page.mouse("mouseReleased", grip[0] + 120, grip[1] - 160);
   claim(held.hold && held.spring > 0, `a body is pulled: ${held.spring.toFixed(3)} J in the spring`);

@@ -11,7 +11,7 @@ for (const line of readFileSync(new URL("../states.txt", import.meta.url), "utf8
   if (only.length && !only.includes(path)) continue;
   const page = engine(), begin = performance.now();
   const { ok, text } = page.open(path.split("/").pop(), [[path.split("/").pop(), readFileSync(new URL(path, root))]], options(path));
-  let got = text.split("\n")[0];
+  let got = text.split("\n")[0].replace(`${path.split("/").pop()}: error: `, "");
   if (ok) {
     const { nq, nv } = JSON.parse(text);
     const { done } = page.advance(10000);
