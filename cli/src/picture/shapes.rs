@@ -46,9 +46,12 @@ struct Part {
     radius: f64,
 }
 
+/// An end of a rod: the frame of its body, `None` of the ground, and its place there.
+pub type End = (Option<usize>, [f64; 3]);
+
 /// A rod between two bodies.
 struct Rod {
-    ends: [(Option<usize>, [f64; 3]); 2],
+    ends: [End; 2],
     colour: usize,
     /// Whether its ends are joints.
     pins: bool,
@@ -173,7 +176,7 @@ impl Shapes {
     }
 
     /// Rods between two bodies: frame and place of both ends, index of the colour.
-    pub fn rods(&self) -> Vec<([(Option<usize>, [f64; 3]); 2], usize)> {
+    pub fn rods(&self) -> Vec<([End; 2], usize)> {
         self.rods.iter().map(|rod| (rod.ends, rod.colour)).collect()
     }
 
