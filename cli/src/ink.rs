@@ -111,6 +111,17 @@ pub fn head(size: [f64; 2], name: &str) -> String {
     )
 }
 
+/// The colours of both kinds of paper, as JSON for the page.
+pub fn json() -> String {
+    let of = |inks: &Inks| {
+        let Inks { lines, paper, text, muted, grid, floor, force, .. } = inks;
+        format!(
+            "{{\"lines\":{lines:?},\"paper\":{paper:?},\"text\":{text:?},\"muted\":{muted:?},\"grid\":{grid:?},\"floor\":{floor:?},\"force\":{force:?}}}"
+        )
+    };
+    format!("{{\"light\":{},\"dark\":{}}}", of(&LIGHT), of(&DARK))
+}
+
 /// The class of a line that is the `k`-th of a chart: colours first, then dashes.
 pub fn line_class(k: usize, dash: usize) -> String {
     let dash = (k / COLOURS + dash) % DASHES;

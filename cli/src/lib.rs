@@ -34,11 +34,13 @@ mod rivals;
 mod simulate;
 mod source;
 mod stale;
+mod start;
 mod tables;
 mod timed;
 mod tour;
 mod trust;
 mod verdict;
+mod view;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -122,6 +124,7 @@ fn run(command: Option<Command>, out: &mut dyn Write) -> Outcome {
         Some(Command::Modes(a)) => modes::run(&a, out),
         Some(Command::Explain(a)) => explain::run(&a, out),
         Some(Command::Identifiable(a)) => identifiable::run(&a, out),
+        Some(Command::View(a)) => view::run(&a, out),
         Some(Command::Completions(a)) => completions::run(&a, out),
     }
 }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use multibody::codegen::model::{Coordinate, Model, Unit, Value};
+use multibody::codegen::model::Value;
 use multibody::codegen::modes;
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
@@ -22,6 +22,7 @@ use super::motion::{simulate, Drift, Record, Settings, Spent};
 use super::output::{note, writable, write_files};
 use super::plot::{self, Panel};
 use super::probe::Probe;
+use super::start::{default_start, default_velocity};
 use super::{
     columns, contacts, energy, interrupt, loops, picture, probe, source, tables, trust, verdict, Failure, Outcome,
 };
@@ -461,8 +462,10 @@ fn start(plan: &Plan, args: &MotionArgs) -> Outcome<(Vec<f64>, Vec<f64>)> {
     }
     let names = plan.coordinate_names();
     let mut q = list("q", &args.q, names.clone(), default_start(plan))?;
-    let speed = if states_start(&plan.model) || args.control.any() { 0.0 } else { 0.1 };
-    let default = plan.start_velocity().unwrap_or_else(|| vec![speed; plan.dims.nv]);
+    let default = match args.control.any() {
+        true => plan.start_velocity().unwrap_or_else(|| vec![0.0; plan.dims.nv]),
+        false => default_velocity(plan),
+    };
     let v = list("v", &args.v, plan.velocity_names(), default)?;
     let interpreter: Interpreter<f64> = plan.default_interpreter();
     for at in interpreter.quaternions() {
@@ -503,48 +506,6 @@ fn end_of_run(plan: &Plan, file: &Path) -> Outcome<(Vec<f64>, Vec<f64>)> {
     let mut state: Vec<f64> = state.into_iter().flatten().collect();
     let v = state.split_off(coordinates.len());
     Ok((state, v))
-}
-
-/// Whether the description says where a motion starts: a mechanism with loops or contacts has a meaning only somewhere.
-fn states_start(model: &Model) -> bool {
-    !model.constraints.is_empty() || !model.starts.is_empty() || !model.contacts.is_empty()
-}
-
-/// The default start; `mbd simulate --help` states it.
-pub fn default_start(plan: &Plan) -> Vec<f64> {
-    let interpreter: Interpreter<f64> = plan.default_interpreter();
-    let model = &plan.model;
-    if states_start(model) {
-        return plan.start();
-    }
-    let mut q = interpreter.neutral();
-    let mut angle = 0.3;
-    for slot in &plan.slots {
-        let Some(Source::State { q: at, .. }) = slot.at else { continue };
-        match plan.model.joints[slot.joint].kind.spec().coordinates {
-            [Coordinate { unit: Unit::Radian, .. }] => {
-                q[at] = angle;
-                angle = -angle;
-            }
-            [_] => q[at] = 0.05,
-            _ => {}
-        }
-        if let Some([lower, upper]) = plan.model.joints[slot.joint].bounds.range {
-            if !(lower..=upper).contains(&q[at]) {
-                q[at] = match lower.is_finite() && upper.is_finite() {
-                    true => 0.5 * (lower + upper),
-                    false => {
-                        if lower.is_finite() {
-                            lower
-                        } else {
-                            upper
-                        }
-                    }
-                };
-            }
-        }
-    }
-    q
 }
 
 /// The plot: coordinates by unit, then the energy.

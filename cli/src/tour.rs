@@ -17,7 +17,8 @@ use multibody::runtime::Interpreter;
 
 use super::motion::{simulate, Record, Settings};
 use super::output::{note, write_file};
-use super::simulate::{default_start, panels, title};
+use super::simulate::{panels, title};
+use super::start::default_start;
 use super::{count, plot, Failure, Outcome};
 
 #[path = "../tour/mod.rs"]

@@ -3,6 +3,7 @@
 mod control;
 mod generate;
 mod values;
+mod view;
 
 use std::path::PathBuf;
 
@@ -15,6 +16,7 @@ use values::{choice, finite, methods, one_of, positive, snap, vector};
 pub use control::{ControlArgs, Gain, Interpolation};
 pub use generate::{CodeArgs, GenerateArgs, Language, DEFAULT_RUNTIME};
 pub use values::{type_name, HOLD};
+pub use view::ViewArgs;
 
 const ABOUT: &str = "Symbolic code generator for multibody dynamics in Hamilton's canonical form.
 
@@ -33,6 +35,7 @@ const EXAMPLES: &str = "Examples:
   mbd generate robot.urdf --outputs rates -o robot.rs straight-line Rust
   mbd generate robot.urdf --lang c -o robot.c         the same in C99, with robot.h
   mbd simulate models/double_pendulum.toml            ten seconds, as CSV and as a picture
+  mbd view robot.urdf                                 a page for browsers in which it moves and can be pulled
   mbd eval robot.urdf --input states.json             numbers out, to compare with other programs
   mbd certify robot.urdf --box states.json            guaranteed bounds over a box of states
   mbd explain robot.urdf --after frames               intermediate results of the generator
@@ -65,6 +68,8 @@ pub enum Command {
     Certify(CertifyArgs),
     /// Simulate; write a CSV file and a plot
     Simulate(SimulateArgs),
+    /// Write a page for browsers, in which the mechanism moves and can be pulled
+    View(ViewArgs),
     /// Find the modes of the contacts that a motion visits, and what they cost
     Modes(ModesArgs),
     /// Show intermediate results of the generator

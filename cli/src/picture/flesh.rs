@@ -26,7 +26,8 @@ pub fn radius(mass: f64, length: f64) -> f64 {
     }
 }
 
-fn rotation(r: &Rotation, number: &dyn Fn(Value) -> f64) -> Mat3 {
+/// The matrix of an orientation.
+pub fn rotation(r: &Rotation, number: &dyn Fn(Value) -> f64) -> Mat3 {
     let about = |axis: Vec3, angle: f64| -> Mat3 {
         let norm = axis.iter().fold(0.0_f64, |n, x| n.hypot(*x)).max(f64::MIN_POSITIVE);
         let [x, y, z] = axis.map(|a| a / norm);

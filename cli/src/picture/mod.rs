@@ -2,11 +2,12 @@
 
 mod animate;
 mod base;
-mod flesh;
-mod limbs;
+pub mod flesh;
+pub mod limbs;
 mod names;
 mod outline;
-mod shapes;
+pub mod shapes;
+mod solid;
 mod touch;
 mod view;
 
@@ -23,7 +24,10 @@ use super::ink;
 use super::motion::Record;
 use super::{Failure, Outcome};
 use outline::Outline;
-use shapes::{Line, Shapes};
+use shapes::Line;
+pub use shapes::Shapes;
+pub use solid::{plate, Directions, Mesh};
+pub use touch::towards;
 use touch::{Arrow, Scale, Touch};
 use view::{Page, View, HEAD, WIDTH};
 

@@ -46,9 +46,12 @@ struct Part {
     radius: f64,
 }
 
+/// An end of a rod: the frame of its body, `None` of the ground, and its place there.
+pub type End = (Option<usize>, [f64; 3]);
+
 /// A rod between two bodies.
 struct Rod {
-    ends: [(Option<usize>, [f64; 3]); 2],
+    ends: [End; 2],
     colour: usize,
     /// Whether its ends are joints.
     pins: bool,
@@ -67,7 +70,7 @@ pub struct Shapes {
 }
 
 /// A point given in a frame, in ground axes.
-fn placed(frames: &[FrameState<f64>], frame: Option<usize>, p: [f64; 3]) -> [f64; 3] {
+pub fn placed(frames: &[FrameState<f64>], frame: Option<usize>, p: [f64; 3]) -> [f64; 3] {
     let Some(f) = frame.map(|f| &frames[f]) else { return p };
     std::array::from_fn(|i| f.position[i] + (0..3).map(|k| f.rotation[i][k] * p[k]).sum::<f64>())
 }
@@ -157,6 +160,24 @@ impl Shapes {
         });
         // Rods are behind the parts that they join, where both are equally far away.
         rods.chain(self.parts.iter().map(|part| line(part, frames))).collect()
+    }
+
+    /// Bodies in the axes of their frames, which `None` is the ground's: the frame, and what is drawn there.
+    pub fn bodies(&self) -> Vec<(Option<usize>, Line)> {
+        let line = |part: &Part| Line {
+            points: part.points.clone(),
+            closed: part.closed,
+            flat: BARS,
+            marks: part.marks.clone(),
+            colour: part.colour,
+            radius: part.radius,
+        };
+        self.parts.iter().map(|part| (part.frame, line(part))).collect()
+    }
+
+    /// Rods between two bodies: frame and place of both ends, index of the colour.
+    pub fn rods(&self) -> Vec<([End; 2], usize)> {
+        self.rods.iter().map(|rod| (rod.ends, rod.colour)).collect()
     }
 
     /// The middle of what is drawn of a body, by its frame.

@@ -91,7 +91,7 @@ pub fn across(n: [f64; 3]) -> [[f64; 3]; 2] {
 }
 
 /// The smallest rotation that takes z to a direction; half a turn about x for −z.
-fn towards(axis: [f64; 3]) -> Mat3<f64> {
+pub fn towards(axis: [f64; 3]) -> Mat3<f64> {
     let [x, y, z] = unit(axis);
     if z < -1.0 + 1e-15 {
         return [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];

@@ -13,4 +13,5 @@ mod parquet;
 mod run;
 mod schema;
 mod trust;
+mod view;
 mod webassembly;

@@ -57,15 +57,15 @@ pub struct Layout {
     pub two_over_pi: usize,
     /// Addresses and contents of what is not zero at the start.
     pub data: Vec<(usize, Vec<u8>)>,
-    /// Length of all, bytes.
+    /// End of all, bytes.
     pub len: usize,
 }
 
 impl Layout {
-    /// The memory for some functions.
-    pub fn new(input: &Input, programs: &[&OutputProgram<Code>], number: Number) -> Layout {
+    /// The memory for some functions, from the address `base` on.
+    pub fn new(input: &Input, programs: &[&OutputProgram<Code>], number: Number, base: usize) -> Layout {
         let (inputs, functions, data) = Default::default();
-        let mut layout = Layout { number, inputs, functions, work: 0, two_over_pi: 0, data, len: 0 };
+        let mut layout = Layout { number, inputs, functions, work: 0, two_over_pi: 0, data, len: base };
         layout.inputs(input, programs);
         for program in programs {
             let results = program.spec.results.iter().map(|array| {

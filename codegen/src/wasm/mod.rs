@@ -21,6 +21,7 @@ mod instructions;
 mod layout;
 mod module;
 mod number;
+mod placed;
 mod sines;
 mod wrapper;
 
@@ -36,6 +37,9 @@ use crate::symbolic::Counts;
 use layout::Layout;
 use number::Number;
 use wrapper::Wrapper;
+
+pub use module::{HOST, MEMORY};
+pub use placed::{place, Placed, PlacedArray};
 
 /// A generated module and information about it.
 #[derive(Clone, Debug)]
@@ -95,10 +99,10 @@ fn files(plan: &Plan, options: &Options, number: Number) -> Result<GeneratedWasm
     }
     let programs = Programs::new(plan, options)?;
     let (input, functions) = (Input { plan, options, programs: &programs }, programs.functions());
-    let layout = Layout::new(&input, &functions, number);
+    let layout = Layout::new(&input, &functions, number, 0);
     let wrapper = Wrapper::new(&input, &layout, &functions);
     Ok(GeneratedWasm {
-        module: module::module(&layout, &functions),
+        module: module::module(&layout, &functions, false),
         wrapper: wrapper.javascript(),
         types: wrapper.types(),
         counts: programs.counts(options),

@@ -1,8 +1,8 @@
 //! The binary module: functions, memory, data.
 
 use wasm_encoder::{
-    CodeSection, ConstExpr, DataSection, ExportKind, ExportSection, Function, FunctionSection, MemorySection,
-    MemoryType, Module, TypeSection,
+    CodeSection, ConstExpr, DataSection, EntityType, ExportKind, ExportSection, Function, FunctionSection,
+    ImportSection, MemorySection, MemoryType, Module, TypeSection,
 };
 
 use super::body::Body;
@@ -17,8 +17,11 @@ use crate::output::OutputProgram;
 /// Name of the exported memory.
 pub const MEMORY: &str = "memory";
 
-/// A module that exports its memory and one function for each program.
-pub fn module(layout: &Layout, programs: &[&OutputProgram<Code>]) -> Vec<u8> {
+/// Name of the module from which a memory is imported.
+pub const HOST: &str = "host";
+
+/// A module that exports one function for each program, and its memory, or imports that of its host.
+pub fn module(layout: &Layout, programs: &[&OutputProgram<Code>], imported: bool) -> Vec<u8> {
     let precision = layout.number.precision();
     let count = programs.len() as u32;
     let functions = SineFunctions { one: count, vector: count + 1 };
@@ -52,8 +55,13 @@ pub fn module(layout: &Layout, programs: &[&OutputProgram<Code>]) -> Vec<u8> {
         shared: false,
         page_size_log2: None,
     });
+    let mut imports = ImportSection::new();
+    let host = MemoryType { minimum: pages, maximum: None, memory64: false, shared: false, page_size_log2: None };
+    imports.import(HOST, MEMORY, EntityType::Memory(host));
     let mut exports = ExportSection::new();
-    exports.export(MEMORY, ExportKind::Memory, 0);
+    if !imported {
+        exports.export(MEMORY, ExportKind::Memory, 0);
+    }
     for (k, program) in (0..).zip(programs) {
         exports.export(program.spec.name, ExportKind::Func, k);
     }
@@ -62,7 +70,12 @@ pub fn module(layout: &Layout, programs: &[&OutputProgram<Code>]) -> Vec<u8> {
         data.active(0, &ConstExpr::i32_const(*offset as i32), bytes.iter().copied());
     }
     let mut module = Module::new();
-    module.section(&types).section(&indices).section(&memories).section(&exports).section(&code).section(&data);
+    module.section(&types);
+    match imported {
+        true => module.section(&imports).section(&indices),
+        false => module.section(&indices).section(&memories),
+    };
+    module.section(&exports).section(&code).section(&data);
     module.finish()
 }
 

@@ -1,0 +1,53 @@
+// The worker: it owns the engine and answers the page, one request after the other. Every file gets a fresh instance, so that
+// nothing is left of the one before.
+
+let module = null, engine = null;
+
+const actions = {
+  async start({ text, module: given }) {
+    module = given ?? (await WebAssembly.compile(unlzma(letters(text))));
+    return { module };
+  },
+  open({ name, files, options, settings, forces }) {
+    engine = makeEngine(module);
+    const { ok, text } = engine.open(name, files, options);
+    if (ok) engine.settings(settings);
+    return { ok, text, numbers: ok ? engine.look(forces) : null, meshes: ok ? engine.meshes() : [] };
+  },
+  /** Steps, with the hand that holds a body moved before. */
+  frame({ steps, most, forces, hand }) {
+    const begin = performance.now();
+    if (hand) engine.exports.pull_to(...hand);
+    const { done, trouble } = engine.advance(steps, most);
+    return { numbers: engine.look(forces), done, trouble, spent: performance.now() - begin };
+  },
+  state({ t, values, forces }) {
+    engine.setState(t, values);
+    return { numbers: engine.look(forces) };
+  },
+  /** A call that changes something; `ok` is false where it was refused, with a text. */
+  change({ call, args, forces }) {
+    const ok = engine.exports[call](...args) !== 0;
+    return { ok, text: ok ? "" : engine.text(), numbers: engine.look(forces) };
+  },
+  settings({ settings, forces }) {
+    engine.settings(settings);
+    return { numbers: engine.look(forces) };
+  },
+  describe() {
+    return { text: engine.describe(), meshes: engine.meshes() };
+  },
+  source() {
+    return { text: engine.source() };
+  },
+};
+
+onmessage = async ({ data }) => {
+  try {
+    const answer = await actions[data.action](data);
+    postMessage({ id: data.id, answer }, answer.numbers ? [answer.numbers.buffer] : []);
+  } catch (error) {
+    // The state of a machine that has stopped is not known: the page starts another.
+    postMessage({ id: data.id, error: String(error?.message ?? error) });
+  }
+};

@@ -1,0 +1,20 @@
+//! The page of `mbd view`: readers, generator, integrators and contacts, behind functions that JavaScript calls.
+//!
+//! One instance holds one [`Scene`](scene::Scene). A program for the same scene without a browser is `main.rs`, whose
+//! states the page's are compared with.
+
+mod abi;
+mod describe;
+mod evaluator;
+mod json;
+mod load;
+mod motion;
+mod picture;
+pub mod scene;
+#[path = "../../cli/src/start.rs"]
+mod start;
+
+/// Colours: limbs ask for their number.
+#[allow(dead_code)]
+#[path = "../../cli/src/ink.rs"]
+mod ink;
