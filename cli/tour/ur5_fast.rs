@@ -12,7 +12,7 @@
 //   q[5] v[5] wrist_3_joint: revolute, moves wrist_3_link
 //
 // Operations (additions + multiplications + divisions; square roots and sine-cosine pairs apart):
-//   rates: 116 + 155 + 5 = 276; 0, 5
+//   rates: 112 + 157 + 5 = 274; 0, 5
 
 /// Dynamics of `ur5` in canonical form: rates. Set the fields between calls.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,7 +64,7 @@ impl Ur5Fast {
     }
 
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
-    /// 276 operations: 116 additions, 155 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
+    /// 274 operations: 112 additions, 157 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     #[inline]
     pub fn rates(&self, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
         ::multibody::runtime::kernel::call::<Self, 0, _>((q, p, &self.tau, qd, pd,));
@@ -147,115 +147,113 @@ impl Ur5Fast {
             let wrist_1_link_sin = sines[4][l];
             // wrist_1_link: inertia carried to the parent, M* (4.48)
             let wrist_1_link_minus_u_x = 0.01778473500000001 * wrist_1_link_cos;
-            let wrist_1_link_minus_u_y = 0.01778473500000001 * wrist_1_link_sin;
-            // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_minus_rho = 1.0 / wrist_2_link_minus_m_rz_rz;
             // wrist_1_link: sine and cosine, rotation
             let wrist_1_link_t2 = 0.39225 * forearm_link_cos;
+            // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
+            let wrist_2_link_minus_rho = 1.0 / wrist_2_link_minus_m_rz_rz;
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_minus_u_y = 0.01778473500000001 * wrist_1_link_sin;
             // wrist_3_link: inertia carried to the parent, M* (4.48)
             let wrist_2_link_m_rx_rx = wrist_3_link_mp_rx_rx + 0.033822000000000005;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
             let wrist_2_link_u_ry = wrist_2_link_sin * wrist_3_link_minus_mp_rx_ry;
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_t3 = 0.03556947000000002 * wrist_1_link_sin;
+            let wrist_1_link_t4 = forearm_link_t1 + wrist_1_link_t1;
+            let wrist_1_link_t5 = 0.03556947000000002 * wrist_1_link_cos;
             // forearm_link: sine and cosine, rotation
             let forearm_link_t3 = 1.598759275 * forearm_link_sin;
-            // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_t3 = forearm_link_t1 + wrist_1_link_t1;
-            // forearm_link: sine and cosine, rotation
-            let forearm_link_t4 = 1.598759275 * forearm_link_cos;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_u_rx = wrist_2_link_cos * wrist_3_link_minus_mp_rx_ry;
             let wrist_2_link_t1 = wrist_2_link_sin * wrist_2_link_m_rx_rx;
             // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_t4 = wrist_1_link_t1 * wrist_1_link_minus_u_x;
+            let wrist_1_link_t6 = wrist_1_link_t1 * wrist_1_link_minus_u_x;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_t5 = wrist_1_link_minus_u_x + wrist_1_link_minus_u_x;
-            let wrist_1_link_t6 = wrist_1_link_minus_u_y + wrist_1_link_minus_u_y;
-            // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_t7 = wrist_1_link_t3 * wrist_1_link_minus_u_x;
+            let wrist_1_link_t7 = forearm_link_t2 + wrist_1_link_t2;
             // forearm_link: sine and cosine, rotation
-            let forearm_link_t5 = 0.5915569516747501 * forearm_link_sin;
+            let forearm_link_t4 = 1.598759275 * forearm_link_cos;
+            // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
+            let wrist_1_link_t8 = wrist_1_link_t4 * wrist_1_link_minus_u_x;
+            // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
+            let wrist_2_link_t2 = wrist_2_link_u_ry * wrist_2_link_u_ry;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_t8 = forearm_link_t2 + wrist_1_link_t2;
-            // wrist_3_link: inertia carried to the parent, M* (4.48)
-            let wrist_3_link_minus_mp_ry_ry = wrist_3_link_sin * wrist_3_link_t0;
+            let wrist_1_link_t9 = wrist_1_link_t2 * wrist_1_link_t3;
+            let wrist_1_link_t10 = A::fma_f64(-wrist_1_link_t1, wrist_1_link_t5, -0.59565195167475);
+            // wrist_2_link: inertia carried to the parent, M* (4.48)
+            let wrist_2_link_u_rx = wrist_2_link_cos * wrist_3_link_minus_mp_rx_ry;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
             let forearm_link_m_rx_z = forearm_link_t3 + wrist_1_link_minus_u_x;
-            let wrist_1_link_t9 = wrist_1_link_t2 * wrist_1_link_t6;
-            let wrist_1_link_t10 = A::fma_f64(-wrist_1_link_t1, wrist_1_link_t5, -0.59565195167475);
             // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_t11 = A::fma_f64(-wrist_1_link_t2, wrist_1_link_minus_u_y, wrist_1_link_t4);
-            let wrist_1_link_t12 = A::fma_f64(-wrist_1_link_t8, wrist_1_link_minus_u_y, wrist_1_link_t7);
+            let wrist_1_link_t11 = A::fma_f64(-wrist_1_link_t2, wrist_1_link_minus_u_y, wrist_1_link_t6);
+            // wrist_3_link: inertia carried to the parent, M* (4.48)
+            let wrist_3_link_minus_mp_ry_ry = wrist_3_link_sin * wrist_3_link_t0;
+            // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
+            let wrist_1_link_t12 = A::fma_f64(-wrist_1_link_t7, wrist_1_link_minus_u_y, wrist_1_link_t8);
             // wrist_2_link: inertia carried to the parent, M* (4.48)
-            let wrist_2_link_t2 = wrist_2_link_sin * wrist_2_link_t1;
+            let wrist_2_link_t3 = wrist_2_link_sin * wrist_2_link_t1;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
             let forearm_link_minus_m_ry_z = forearm_link_t4 - wrist_1_link_minus_u_y;
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_t3 = wrist_2_link_cos * wrist_2_link_t1;
+            let wrist_2_link_t4 = wrist_2_link_cos * wrist_2_link_t1;
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_t13 = wrist_1_link_t9 + wrist_1_link_t10;
             // wrist_3_link: momentum rate (4.36)
             let wrist_3_link_t2 = wrist_3_link_minus_mp_ry_ry + wrist_3_link_mp_rx_rx;
             // forearm_link: inertia carried to the parent, M* (4.48)
-            let forearm_link_t6 = forearm_link_m_rx_z + forearm_link_m_rx_z;
+            let forearm_link_t5 = forearm_link_m_rx_z + forearm_link_m_rx_z;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
             let ground_t0 = forearm_link_t1 * forearm_link_m_rx_z;
-            // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_t13 = wrist_1_link_t9 + wrist_1_link_t10;
-            // forearm_link: inertia carried to the parent, M* (4.48)
-            let forearm_link_t7 = A::fma_f64(forearm_link_t1, forearm_link_t6, 1.7701269384099998);
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_t4 = wrist_2_link_m_rx_rx - wrist_2_link_t2;
+            let wrist_2_link_t5 = wrist_2_link_m_rx_rx - wrist_2_link_t3;
+            let wrist_2_link_mp_ry_ry = A::fma_f64(wrist_2_link_minus_rho, wrist_2_link_t2, wrist_2_link_t3);
+            let wrist_2_link_t6 = wrist_2_link_u_rx * wrist_2_link_u_ry;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_t1 = A::fma_f64(-forearm_link_t2, forearm_link_minus_m_ry_z, -ground_t0);
+            let ground_t1 = A::fma_f64(forearm_link_t1, forearm_link_t5, 1.7701269384099998);
+            let ground_t2 = A::fma_f64(-forearm_link_t2, forearm_link_minus_m_ry_z, -ground_t0);
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_t5 = wrist_2_link_u_ry * wrist_2_link_u_ry;
-            let wrist_2_link_mp_ry_ry = A::fma_f64(wrist_2_link_minus_rho, wrist_2_link_t5, wrist_2_link_t2);
+            let wrist_2_link_mp_rx_ry = A::fma_f64(wrist_2_link_minus_rho, wrist_2_link_t6, wrist_2_link_t4);
+            // wrist_1_link: inertia carried to the parent, M* (4.48)
+            let wrist_1_link_t14 = 0.001941203825250001 * wrist_1_link_cos;
+            let wrist_1_link_minus_u_ry = A::fma_f64(wrist_1_link_sin, wrist_2_link_mp_rx_ry, wrist_1_link_t14);
             // wrist_2_link: inertia carried to the parent, M* (4.48)
             let wrist_1_link_m_rz_rz = wrist_2_link_mp_ry_ry + 0.22402883622975;
             // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_t14 = wrist_1_link_m_rz_rz + wrist_1_link_t11;
+            let wrist_1_link_t15 = wrist_1_link_m_rz_rz + wrist_1_link_t11;
             // wrist_1_link: inertia carried to the parent, M* (4.48)
             let forearm_link_m_rz_rz = wrist_1_link_m_rz_rz - wrist_1_link_t13;
             // wrist_1_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_1_link_t15 = wrist_1_link_m_rz_rz + wrist_1_link_t12;
+            let wrist_1_link_t16 = wrist_1_link_m_rz_rz + wrist_1_link_t12;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_t2 = 1.0 / wrist_1_link_m_rz_rz;
-            let ground_t3 = forearm_link_m_rz_rz - ground_t1;
-            let ground_t4 = wrist_1_link_t14 * wrist_1_link_t14;
-            let ground_t5 = A::fma_f64(ground_t2, ground_t4, -forearm_link_m_rz_rz);
-            let ground_t6 = 1.0 / ground_t5;
+            let ground_t3 = 1.0 / wrist_1_link_m_rz_rz;
+            let ground_t4 = forearm_link_m_rz_rz - ground_t2;
+            let ground_t5 = wrist_1_link_t15 * wrist_1_link_t15;
+            let ground_t6 = A::fma_f64(ground_t3, ground_t5, -forearm_link_m_rz_rz);
+            let ground_t7 = 1.0 / ground_t6;
             // forearm_link: inertia carried to the parent, M* (4.48)
-            let forearm_link_t8 = forearm_link_minus_m_ry_z + forearm_link_minus_m_ry_z;
-            let forearm_link_t9 = forearm_link_t2 * forearm_link_t8;
-            let forearm_link_t10 = forearm_link_t9 + forearm_link_t7;
-            let upper_arm_link_m_rz_rz = forearm_link_m_rz_rz + forearm_link_t10;
-            // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
-            let wrist_2_link_t6 = wrist_2_link_u_rx * wrist_2_link_u_ry;
-            let wrist_2_link_mp_rx_ry = A::fma_f64(wrist_2_link_minus_rho, wrist_2_link_t6, wrist_2_link_t3);
+            let forearm_link_t6 = forearm_link_minus_m_ry_z + forearm_link_minus_m_ry_z;
+            let forearm_link_t7 = forearm_link_t2 * forearm_link_t6;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_t7 = A::fma_f64(upper_arm_link_sin, upper_arm_link_t0, -2.7644263025275);
-            let ground_t8 = A::fma_f64(forearm_link_sin, forearm_link_t5, ground_t7);
-            let ground_t9 = wrist_1_link_t9 + ground_t8;
-            let ground_t10 = forearm_link_t9 - ground_t9;
+            let ground_t8 = forearm_link_t7 + ground_t1;
+            let ground_t9 = forearm_link_m_rz_rz + ground_t8;
+            let ground_t10 = wrist_1_link_t16 * ground_t3;
+            let ground_t11 = A::fma_f64(wrist_1_link_t15, ground_t10, -ground_t4);
+            let ground_t12 = A::fma_f64(-wrist_1_link_t16, ground_t10, ground_t9);
+            // forearm_link: sine and cosine, rotation
+            let forearm_link_t8 = 0.5915569516747501 * forearm_link_sin;
+            // ground: U, Mj, k and the reduced inertia M' (4.44)
+            let ground_t13 = A::fma_f64(upper_arm_link_sin, upper_arm_link_t0, -2.7644263025275);
+            let ground_t14 = A::fma_f64(forearm_link_sin, forearm_link_t8, ground_t13);
+            let ground_t15 = wrist_1_link_t9 + ground_t14;
+            let ground_t16 = forearm_link_t7 - ground_t15;
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
             let wrist_2_link_minus_k_rx = wrist_2_link_u_rx * wrist_2_link_minus_rho;
-            let wrist_2_link_mp_rx_rx = A::fma_f64(wrist_2_link_u_rx, wrist_2_link_minus_k_rx, wrist_2_link_t4);
+            let wrist_2_link_mp_rx_rx = A::fma_f64(wrist_2_link_u_rx, wrist_2_link_minus_k_rx, wrist_2_link_t5);
             // wrist_2_link: momentum rate (4.36)
             let wrist_2_link_t7 = wrist_2_link_mp_rx_rx - wrist_2_link_mp_ry_ry;
             // wrist_2_link: inertia carried to the parent, M* (4.48)
             let wrist_1_link_m_rx_rx = wrist_2_link_mp_rx_rx + 0.004608836229749974;
-            // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_t11 = wrist_1_link_t15 * ground_t2;
-            let ground_t12 = A::fma_f64(wrist_1_link_t14, ground_t11, -ground_t3);
             // wrist_1_link: inertia carried to the parent, M* (4.48)
-            let wrist_1_link_t16 = 0.001941203825250001 * wrist_1_link_cos;
-            let wrist_1_link_minus_u_ry = A::fma_f64(wrist_1_link_sin, wrist_2_link_mp_rx_ry, wrist_1_link_t16);
             let wrist_1_link_t17 = 0.07714261911624999 * forearm_link_sin;
             let forearm_link_minus_m_ry_rz = wrist_1_link_minus_u_ry + wrist_1_link_t17;
-            // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_t13 = wrist_1_link_sin * wrist_1_link_sin;
-            let ground_t14 = A::fma_f64(-wrist_1_link_m_rx_rx, ground_t13, -ground_t10);
-            let ground_t15 = upper_arm_link_m_rz_rz - ground_t14;
-            let ground_t16 = upper_arm_link_m_rz_rz - ground_t15;
-            let ground_t17 = A::fma_f64(-wrist_1_link_t15, ground_t11, upper_arm_link_m_rz_rz);
             // wrist_2_link: bias momentum D, D' (4.45, 4.49)
             let wrist_2_link_minus_e = p_4 * wrist_2_link_minus_rho;
             // wrist_2_link: U, Mj, k and the reduced inertia M' (4.44)
@@ -263,77 +261,79 @@ impl Ur5Fast {
             // wrist_2_link: bias momentum D, D' (4.45, 4.49)
             let wrist_2_link_dp_ry = A::fma_f64(-wrist_2_link_u_ry, wrist_2_link_minus_e, wrist_2_link_t0);
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_t18 = ground_t12 * ground_t12;
-            let ground_t19 = A::fma_f64(ground_t6, ground_t18, ground_t17);
-            let ground_t20 = 1.0 / ground_t19;
-            let ground_t21 = wrist_1_link_minus_u_ry * ground_t2;
-            let ground_t22 = A::fma_f64(wrist_1_link_minus_u_ry, ground_t21, ground_t16);
-            let ground_t23 = 0.408499208875 * upper_arm_link_sin;
-            let ground_t24 = forearm_link_minus_m_ry_rz + ground_t23;
-            let ground_t25 = A::fma_f64(-wrist_1_link_t14, ground_t21, forearm_link_minus_m_ry_rz);
-            let ground_t26 = A::fma_f64(wrist_1_link_t15, ground_t21, -ground_t24);
+            let ground_t17 = ground_t11 * ground_t11;
+            let ground_t18 = A::fma_f64(ground_t7, ground_t17, ground_t12);
+            let ground_t19 = 1.0 / ground_t18;
+            let ground_t20 = wrist_1_link_minus_u_ry * ground_t3;
+            let ground_t21 = 0.408499208875 * upper_arm_link_sin;
+            let ground_t22 = forearm_link_minus_m_ry_rz + ground_t21;
+            let ground_t23 = A::fma_f64(-wrist_1_link_t15, ground_t20, forearm_link_minus_m_ry_rz);
+            let ground_t24 = A::fma_f64(wrist_1_link_t16, ground_t20, -ground_t22);
+            let ground_t25 = wrist_1_link_sin * wrist_1_link_sin;
+            let ground_t26 = A::fma_f64(-wrist_1_link_m_rx_rx, ground_t25, -ground_t16);
+            let ground_t27 = A::fma_f64(wrist_1_link_minus_u_ry, ground_t20, ground_t26);
             // shoulder_link: bias momentum D, D' (4.45, 4.49)
             let shoulder_link_t0 = p_3 - wrist_2_link_dp_ry;
-            let shoulder_link_t1 = ground_t2 * shoulder_link_t0;
+            let shoulder_link_t1 = ground_t3 * shoulder_link_t0;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_t27 = wrist_1_link_t14 * ground_t2;
-            let ground_t28 = ground_t25 * ground_t6;
-            let ground_t29 = A::fma_f64(ground_t12, ground_t28, ground_t26);
-            let ground_t30 = A::fma_f64(-ground_t25, ground_t28, ground_t22);
+            let ground_t28 = wrist_1_link_t15 * ground_t3;
+            let ground_t29 = ground_t23 * ground_t7;
+            let ground_t30 = A::fma_f64(ground_t11, ground_t29, ground_t24);
+            let ground_t31 = A::fma_f64(-ground_t23, ground_t29, ground_t27);
             // wrist_2_link: bias momentum D, D' (4.45, 4.49)
             let wrist_2_link_t8 = p_5 * wrist_2_link_sin;
             let wrist_2_link_minus_dp_rx = A::fma_f64(wrist_2_link_u_rx, wrist_2_link_minus_e, wrist_2_link_t8);
             // shoulder_link: bias momentum D, D' (4.45, 4.49)
             let shoulder_link_t2 = p_2 - wrist_2_link_dp_ry;
-            let shoulder_link_t3 = A::fma_f64(wrist_1_link_t14, shoulder_link_t1, -shoulder_link_t2);
-            let shoulder_link_t4 = ground_t6 * shoulder_link_t3;
+            let shoulder_link_t3 = A::fma_f64(wrist_1_link_t15, shoulder_link_t1, -shoulder_link_t2);
+            let shoulder_link_t4 = ground_t7 * shoulder_link_t3;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_t31 = ground_t12 * ground_t6;
+            let ground_t32 = ground_t11 * ground_t7;
             // shoulder_link: bias momentum D, D' (4.45, 4.49)
             let shoulder_link_t5 = A::fma_f64(p_4, wrist_1_link_cos, p_0);
             let shoulder_link_t6 = A::fma_f64(wrist_1_link_sin, wrist_2_link_minus_dp_rx, shoulder_link_t5);
             let shoulder_link_t7 = A::fma_f64(-wrist_1_link_minus_u_ry, shoulder_link_t1, shoulder_link_t6);
-            let shoulder_link_t8 = A::fma_f64(-ground_t25, shoulder_link_t4, shoulder_link_t7);
+            let shoulder_link_t8 = A::fma_f64(-ground_t23, shoulder_link_t4, shoulder_link_t7);
             let shoulder_link_t9 = p_1 - wrist_2_link_dp_ry;
-            let shoulder_link_t10 = A::fma_f64(-wrist_1_link_t15, shoulder_link_t1, shoulder_link_t9);
-            let shoulder_link_t11 = A::fma_f64(ground_t12, shoulder_link_t4, shoulder_link_t10);
-            let shoulder_link_t12 = ground_t20 * shoulder_link_t11;
-            let shoulder_link_t13 = A::fma_f64(ground_t29, shoulder_link_t12, shoulder_link_t8);
+            let shoulder_link_t10 = A::fma_f64(-wrist_1_link_t16, shoulder_link_t1, shoulder_link_t9);
+            let shoulder_link_t11 = A::fma_f64(ground_t11, shoulder_link_t4, shoulder_link_t10);
+            let shoulder_link_t12 = ground_t19 * shoulder_link_t11;
+            let shoulder_link_t13 = A::fma_f64(ground_t30, shoulder_link_t12, shoulder_link_t8);
             // ground: velocity and joint rate (4.40)
-            let ground_t32 = ground_t28 * shoulder_link_t13;
-            let ground_t33 = ground_t21 * shoulder_link_t13;
+            let ground_t33 = ground_t29 * shoulder_link_t13;
+            let ground_t34 = ground_t20 * shoulder_link_t13;
             // forearm_link: momentum
-            let forearm_link_t11 = upper_arm_link_t0 * shoulder_link_t13;
+            let forearm_link_t9 = upper_arm_link_t0 * shoulder_link_t13;
             // wrist_1_link: momentum
-            let wrist_1_link_t18 = forearm_link_t5 * shoulder_link_t13;
+            let wrist_1_link_t18 = forearm_link_t8 * shoulder_link_t13;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_t34 = ground_t29 * ground_t29;
-            let ground_t35 = ground_t29 * ground_t20;
-            let ground_t36 = A::fma_f64(ground_t20, ground_t34, ground_t30);
+            let ground_t35 = ground_t30 * ground_t30;
+            let ground_t36 = ground_t30 * ground_t19;
+            let ground_t37 = A::fma_f64(ground_t19, ground_t35, ground_t31);
             // ground: velocity and joint rate (4.40)
-            let ground_t37 = ground_t35 * shoulder_link_t13;
+            let ground_t38 = ground_t36 * shoulder_link_t13;
             // ground: U, Mj, k and the reduced inertia M' (4.44)
-            let ground_t38 = 1.0 / ground_t36;
+            let ground_t39 = 1.0 / ground_t37;
             // ground: velocity and joint rate (4.40)
-            let upper_arm_link_v = A::fma_f64(-ground_t38, ground_t37, shoulder_link_t12);
-            let ground_t39 = A::fma_f64(ground_t38, ground_t32, -shoulder_link_t4);
-            let ground_t40 = A::fma_f64(ground_t38, ground_t33, shoulder_link_t1);
+            let upper_arm_link_v = A::fma_f64(-ground_t39, ground_t38, shoulder_link_t12);
+            let ground_t40 = A::fma_f64(ground_t39, ground_t33, -shoulder_link_t4);
+            let ground_t41 = A::fma_f64(ground_t39, ground_t34, shoulder_link_t1);
             // forearm_link: momentum
-            let forearm_link_t12 = ground_t38 * forearm_link_t11;
+            let forearm_link_t10 = ground_t39 * forearm_link_t9;
             // wrist_1_link: momentum
-            let wrist_1_link_t19 = ground_t38 * wrist_1_link_t18;
+            let wrist_1_link_t19 = ground_t39 * wrist_1_link_t18;
             // ground: velocity and joint rate (4.40)
-            let forearm_link_minus_v = A::fma_f64(ground_t31, upper_arm_link_v, ground_t39);
-            let ground_t41 = A::fma_f64(-ground_t11, upper_arm_link_v, ground_t40);
+            let forearm_link_minus_v = A::fma_f64(ground_t32, upper_arm_link_v, ground_t40);
+            let ground_t42 = A::fma_f64(-ground_t10, upper_arm_link_v, ground_t41);
             // forearm_link: momentum
-            let forearm_link_t13 = A::fma_f64(0.408499208875, upper_arm_link_v, forearm_link_t12);
+            let forearm_link_t11 = A::fma_f64(0.408499208875, upper_arm_link_v, forearm_link_t10);
             // ground: velocity and joint rate (4.40)
-            let wrist_1_link_v = A::fma_f64(ground_t27, forearm_link_minus_v, ground_t41);
+            let wrist_1_link_v = A::fma_f64(ground_t28, forearm_link_minus_v, ground_t42);
             // forearm_link: momentum
-            let forearm_link_t14 = upper_arm_link_cos * forearm_link_t13;
+            let forearm_link_t12 = upper_arm_link_cos * forearm_link_t11;
             // wrist_1_link: velocity and joint rate (4.40)
             let wrist_1_link_t20 = wrist_1_link_sin * shoulder_link_t13;
-            let wrist_1_link_minus_omega_rx = ground_t38 * wrist_1_link_t20;
+            let wrist_1_link_minus_omega_rx = ground_t39 * wrist_1_link_t20;
             // wrist_2_link: momentum
             let wrist_2_link_t9 = wrist_1_link_m_rx_rx * wrist_1_link_minus_omega_rx;
             // wrist_2_link: velocity and joint rate (4.40)
@@ -341,12 +341,12 @@ impl Ur5Fast {
             // wrist_2_link: momentum rate (4.36)
             let wrist_2_link_t11 = A::fma_f64(wrist_2_link_mp_rx_ry, wrist_1_link_minus_omega_rx, -wrist_2_link_dp_ry);
             // forearm_link: velocity and joint rate (4.40)
-            let forearm_link_t15 = forearm_link_t2 * shoulder_link_t13;
+            let forearm_link_t13 = forearm_link_t2 * shoulder_link_t13;
             let forearm_link_hat_y = forearm_link_t2 * upper_arm_link_v;
-            let forearm_link_minus_hat_z = ground_t38 * forearm_link_t15;
+            let forearm_link_minus_hat_z = ground_t39 * forearm_link_t13;
             // wrist_1_link: velocity and joint rate (4.40)
             let wrist_1_link_t21 = wrist_1_link_t2 * shoulder_link_t13;
-            let wrist_1_link_t22 = ground_t38 * wrist_1_link_t21;
+            let wrist_1_link_t22 = ground_t39 * wrist_1_link_t21;
             let wrist_1_link_minus_hat_z = forearm_link_minus_hat_z + wrist_1_link_t22;
             // wrist_1_link: momentum
             let wrist_1_link_t23 = forearm_link_t3 * forearm_link_minus_hat_z;
@@ -390,7 +390,7 @@ impl Ur5Fast {
             // wrist_1_link: momentum
             let wrist_1_link_t33 = A::fma_f64(wrist_1_link_cos, wrist_2_link_t15, -wrist_1_link_t29);
             let wrist_1_link_t34 = wrist_1_link_sin * wrist_1_link_t26;
-            let wrist_1_link_t35 = ground_t38 * wrist_1_link_t30;
+            let wrist_1_link_t35 = ground_t39 * wrist_1_link_t30;
             let wrist_1_link_t36 = wrist_1_link_cos * wrist_1_link_t26;
             // wrist_1_link: velocity and joint rate (4.40)
             let wrist_1_link_minus_hat_x = A::fma_f64(wrist_1_link_t1, forearm_link_omega_rz, forearm_link_minus_hat_x);
@@ -407,11 +407,11 @@ impl Ur5Fast {
             let wrist_3_link_t5 = A::fma_f64(-0.1744682503500001, wrist_1_link_sin, tau_3);
             let wrist_3_link_t6 = A::fma_f64(-forearm_link_minus_hat_x, wrist_1_link_t38, wrist_3_link_t4);
             // forearm_link: inertia carried to the parent, M* (4.48)
-            let forearm_link_t16 = 4.4329225 * upper_arm_link_cos;
+            let forearm_link_t14 = 4.4329225 * upper_arm_link_cos;
             // wrist_3_link: velocity and joint rate (4.40)
             let wrist_3_link_t7 = 58.355064750790525 * p_5;
             // forearm_link: momentum
-            let forearm_link_t17 = A::fma_f64(-forearm_link_t1, wrist_1_link_t39, forearm_link_t14);
+            let forearm_link_t15 = A::fma_f64(-forearm_link_t1, wrist_1_link_t39, forearm_link_t12);
             // wrist_1_link: momentum
             let wrist_1_link_t41 = wrist_1_link_t37 + wrist_1_link_t32;
             // wrist_3_link: momentum rate (4.36)
@@ -421,29 +421,29 @@ impl Ur5Fast {
             // wrist_2_link: velocity and joint rate (4.40)
             let wrist_2_link_t17 = wrist_1_link_cos * shoulder_link_t13;
             // shoulder_link: bias momentum D, D' (4.45, 4.49)
-            let shoulder_link_minus_v = ground_t38 * shoulder_link_t13;
+            let shoulder_link_minus_v = ground_t39 * shoulder_link_t13;
             // wrist_3_link: momentum rate (4.36)
             let wrist_3_link_t11 = A::fma_f64(-forearm_link_hat_y, wrist_1_link_t40, wrist_3_link_t6);
             // forearm_link: inertia carried to the parent, M* (4.48)
-            let upper_arm_link_minus_m_ry_z = forearm_link_minus_m_ry_z + forearm_link_t16;
+            let upper_arm_link_minus_m_ry_z = forearm_link_minus_m_ry_z + forearm_link_t14;
             // wrist_3_link: velocity and joint rate (4.40)
             let wrist_3_link_t12 = A::fma_f64(-wrist_2_link_sin, wrist_1_link_minus_omega_rx, wrist_3_link_t7);
             // forearm_link: momentum
-            let forearm_link_t18 = wrist_1_link_t41 - forearm_link_t17;
+            let forearm_link_t16 = wrist_1_link_t41 - forearm_link_t15;
             // wrist_3_link: momentum rate (4.36)
             let wrist_3_link_t13 = A::fma_f64(-wrist_2_link_minus_omega_rz, wrist_3_link_t2, wrist_3_link_t8);
             let wrist_3_link_t14 = A::fma_f64(-wrist_2_link_minus_omega_rz, wrist_3_link_t9, tau_5);
             let wrist_3_link_t15 = A::fma_f64(9.81, upper_arm_link_minus_m_ry_z, tau_1);
             let wrist_3_link_t16 = A::fma_f64(-wrist_1_link_hat_y, wrist_1_link_t36, wrist_3_link_t10);
             // wrist_2_link: velocity and joint rate (4.40)
-            let wrist_2_link_t18 = ground_t38 * wrist_2_link_t17;
+            let wrist_2_link_t18 = ground_t39 * wrist_2_link_t17;
             // wrist_3_link: momentum rate (4.36)
             let pd_2 = A::fma_f64(shoulder_link_minus_v, wrist_1_link_t41, wrist_3_link_t11);
             // wrist_3_link: velocity and joint rate (4.40)
             let wrist_3_link_v = A::fma_f64(-wrist_2_link_cos, wrist_1_link_omega_rz, wrist_3_link_t12);
             // wrist_3_link: momentum rate (4.36)
             let pd_5 = A::fma_f64(wrist_2_link_minus_omega_rx, wrist_3_link_t13, wrist_3_link_t14);
-            let pd_1 = A::fma_f64(shoulder_link_minus_v, forearm_link_t18, wrist_3_link_t15);
+            let pd_1 = A::fma_f64(shoulder_link_minus_v, forearm_link_t16, wrist_3_link_t15);
             let pd_3 = A::fma_f64(shoulder_link_minus_v, wrist_1_link_t37, wrist_3_link_t16);
             // wrist_2_link: velocity and joint rate (4.40)
             let wrist_2_link_minus_v = wrist_2_link_minus_omega_rz + wrist_2_link_t18;
