@@ -13,7 +13,6 @@
 //! Bogfjellmo and Marthinsen, *High-order symplectic partitioned Lie group methods*, 2016, section 2, with Cayley's map
 //! in place of the exponential: its inverse differential is a polynomial.
 
-use super::combine::{combine, Then};
 use super::lie_joint::normalise;
 use super::StepError;
 use crate::constant::Constant;
@@ -74,10 +73,8 @@ impl<Y: System> Point<Y> {
     /// `self = h Σ wⱼ k_j` over the pairs `(j, wⱼ)`.
     #[inline]
     pub fn combine(&mut self, h: Y::Scalar, weights: &[(usize, Constant)], k: &[Self]) {
-        let weights = weights.iter().map(|&(j, w)| (j, w.get()));
-        let (x, p) = (self.x.as_mut(), self.p.as_mut());
-        combine(x, Then::Scale(h), weights.clone(), |j| k.get(j).map_or(&[], |k| k.x.as_ref()));
-        combine(p, Then::Scale(h), weights, |j| k.get(j).map_or(&[], |k| k.p.as_ref()));
+        combine(self.x.as_mut(), h, weights, |j| k.get(j).map_or(&[], |k| k.x.as_ref()));
+        combine(self.p.as_mut(), h, weights, |j| k.get(j).map_or(&[], |k| k.p.as_ref()));
     }
 
     /// `self *= w`.
@@ -91,17 +88,40 @@ impl<Y: System> Point<Y> {
     }
 }
 
+/// `out = h Σ wⱼ k(j)`, a few components at a time, so that their sums stay in registers. Every `k(j)` is as long as
+/// `out`: where the compiler cannot know that, there must not be a panic path either.
+#[inline(always)]
+fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, Constant)], k: impl Fn(usize) -> &'a [S]) {
+    // The sum starts at minus zero: minus zero plus a term is that term, and the compiler removes this addition. It
+    // could not remove an addition of plus zero.
+    let nothing = -S::zero();
+    let whole = out.len() - out.len() % 4;
+    let mut chunks = out.chunks_exact_mut(4);
+    for (out, at) in chunks.by_ref().zip((0..).step_by(4)) {
+        let mut sum = [nothing; 4];
+        for &(j, w) in weights {
+            let w: S = w.get();
+            let Some(k) = k(j).get(at..).and_then(|k| k.first_chunk::<4>()) else { continue };
+            for l in 0..4 {
+                sum[l] = sum[l] + w * k[l];
+            }
+        }
+        for (out, sum) in out.iter_mut().zip(sum) {
+            *out = h * sum;
+        }
+    }
+    for (out, at) in chunks.into_remainder().iter_mut().zip(whole..) {
+        let term = |j: usize, w: Constant| k(j).get(at).map_or(nothing, |k| w.get::<S>() * *k);
+        *out = h * weights.iter().fold(nothing, |sum, &(j, w)| sum + term(j, w));
+    }
+}
+
 impl<Y: System> Point<Y>
 where
     Y::Scalar: Real,
 {
     /// Index of the first component that is not finite, momenta after coordinates.
     pub fn not_finite(&self) -> Option<usize> {
-        // All are examined, so that there is no branch for each of them.
-        let finite = |part: &[Y::Scalar]| part.iter().fold(true, |all, x| all & x.is_finite());
-        if finite(self.x.as_ref()) & finite(self.p.as_ref()) {
-            return None;
-        }
         self.parts().into_iter().flatten().position(|x| !x.is_finite())
     }
 }
@@ -225,26 +245,6 @@ where
                 group.inward(q, group.shift(x), p.as_mut());
             }
         }
-    }
-
-    /// State at the displacement `Σ wⱼ k_j` in one pass, without the displacement being stored: where nothing but
-    /// addition leads there. Returns whether this is so.
-    #[inline(always)]
-    pub fn stage(
-        &self,
-        system: &Y,
-        weights: impl Iterator<Item = (usize, Y::Scalar)> + Clone,
-        k: &[Point<Y>],
-        q: &mut Y::Coordinates,
-        p: &mut Y::Momenta,
-    ) -> bool {
-        if self.carry.is_some() || !system.lie_joints().is_empty() {
-            return false;
-        }
-        let (q0, p0) = (Then::AddTo(self.q.as_ref()), Then::AddTo(self.p.as_ref()));
-        combine(q.as_mut(), q0, weights.clone(), |j| k.get(j).map_or(&[], |k| k.x.as_ref()));
-        combine(p.as_mut(), p0, weights, |j| k.get(j).map_or(&[], |k| k.p.as_ref()));
-        true
     }
 
     /// Rates of the displacement from those of the state `(q, p)` it leads to: `q̇`, and `ṗ` at the place of its

@@ -2,9 +2,7 @@
 
 use super::chart::{Chart, Point};
 use super::StepError;
-use crate::constant::Constant;
 use crate::system::{Real, System};
-use crate::Scalar;
 
 /// The rates of a system in the chart about a state, and the number of their evaluations.
 #[derive(Clone, Debug)]
@@ -54,35 +52,24 @@ where
     /// # Errors
     /// [`StepError::Quaternion`].
     pub fn load(&mut self, system: &Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
-        if !self.holds(system, q, p) {
+        if !self.holds(q, p) {
             self.chart.load(system, t.to_f64(), q, p)?;
         }
         self.stored = false;
         Ok(())
     }
 
-    /// Whether the chart's state is the state itself, because all displacements are added.
-    fn is_plain(system: &Y) -> bool {
-        system.lie_joints().is_empty()
-    }
-
     /// Whether a state is the one that [`Field::store`] gave last, and nothing has been evaluated since. Methods with
     /// a history then continue.
-    pub fn holds(&self, system: &Y, q: &Y::Coordinates, p: &Y::Momenta) -> bool {
-        let (q0, p0) = match Self::is_plain(system) {
-            true => self.chart.held(),
-            false => (self.q.as_ref(), self.p.as_ref()),
-        };
-        self.stored && q0 == q.as_ref() && p0 == p.as_ref()
+    pub fn holds(&self, q: &Y::Coordinates, p: &Y::Momenta) -> bool {
+        self.stored && self.q.as_ref() == q.as_ref() && self.p.as_ref() == p.as_ref()
     }
 
     /// Copies the state from which displacements start.
     pub fn store(&mut self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
-        self.chart.base(system, q, p);
-        if !Self::is_plain(system) {
-            self.q.as_mut().copy_from_slice(q.as_ref());
-            self.p.as_mut().copy_from_slice(p.as_ref());
-        }
+        self.chart.base(system, &mut self.q, &mut self.p);
+        q.as_mut().copy_from_slice(self.q.as_ref());
+        p.as_mut().copy_from_slice(self.p.as_ref());
         self.stored = true;
     }
 
@@ -98,53 +85,9 @@ where
     #[inline]
     pub fn rates(&mut self, system: &mut Y, t: Y::Scalar, point: &Point<Y>, out: &mut Point<Y>) {
         self.chart.state(system, point, &mut self.q, &mut self.p);
-        self.evaluate(system, t, point, out);
-    }
-
-    /// Rates at time `t` (s) and the displacement `h Σ wⱼ k_j` over the pairs `(j, wⱼ)`, at most `N`. Overwrites `stage`,
-    /// where the displacement is stored if it takes more than addition to reach the state there.
-    #[inline(always)]
-    pub(super) fn stage_rates<const N: usize>(
-        &mut self,
-        system: &mut Y,
-        (t, h): (Y::Scalar, Y::Scalar),
-        (weights, k): (&[(usize, Constant)], &[Point<Y>]),
-        stage: &mut Point<Y>,
-        out: &mut Point<Y>,
-    ) {
-        // The step is multiplied in beforehand, where nothing waits for it.
-        let mut scaled = [Y::Scalar::zero(); N];
-        scaled.iter_mut().zip(weights).for_each(|(scaled, (_, w))| *scaled = h * w.get());
-        let scaled = weights.iter().zip(&scaled).map(|((j, _), w)| (*j, *w));
-        if !self.chart.stage(system, scaled, k, &mut self.q, &mut self.p) {
-            self.displace(system, (weights, k), h, stage);
-        }
-        self.evaluate(system, t, stage, out);
-    }
-
-    /// The state at the displacement `h Σ wⱼ k_j`, which is stored in `stage`. Apart from its caller, so that the code of
-    /// a small processor has no second copy of what it does not run.
-    #[inline(never)]
-    fn displace(
-        &mut self,
-        system: &Y,
-        (weights, k): (&[(usize, Constant)], &[Point<Y>]),
-        h: Y::Scalar,
-        stage: &mut Point<Y>,
-    ) {
-        stage.combine(h, weights, k);
-        self.chart.state(system, stage, &mut self.q, &mut self.p);
-    }
-
-    /// Rates at the state `(q, p)` of this field, to which the displacement `point` leads.
-    #[inline(always)]
-    fn evaluate(&mut self, system: &mut Y, t: Y::Scalar, point: &Point<Y>, out: &mut Point<Y>) {
+        system.rates_at(t, &self.q, &self.p, &mut self.qd, &mut out.p);
         self.stored = false;
         self.evaluations += 1;
-        if system.rates_by_velocities(t, &self.q, &self.p, &mut out.x, &mut out.p) {
-            return;
-        }
-        system.rates_at(t, &self.q, &self.p, &mut self.qd, &mut out.p);
         self.chart.rates(system, point, (&self.q, &self.p), &self.qd, out);
     }
 

@@ -28,7 +28,6 @@
 mod adams;
 pub mod chart;
 mod collocation;
-mod combine;
 mod control;
 mod doubling;
 mod energy_projection;
