@@ -1077,26 +1077,16 @@ impl Chain10Planar {
             results[18][l] = pd_8;
             results[19][l] = pd_9;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
-        qd.give(6, &results[6]);
-        qd.give(7, &results[7]);
-        qd.give(8, &results[8]);
-        qd.give(9, &results[9]);
-        pd.give(0, &results[10]);
-        pd.give(1, &results[11]);
-        pd.give(2, &results[12]);
-        pd.give(3, &results[13]);
-        pd.give(4, &results[14]);
-        pd.give(5, &results[15]);
-        pd.give(6, &results[16]);
-        pd.give(7, &results[17]);
-        pd.give(8, &results[18]);
-        pd.give(9, &results[19]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
+        qd.give_pair(6, [&results[6], &results[7]]);
+        qd.give_pair(8, [&results[8], &results[9]]);
+        pd.give_pair(0, [&results[10], &results[11]]);
+        pd.give_pair(2, [&results[12], &results[13]]);
+        pd.give_pair(4, [&results[14], &results[15]]);
+        pd.give_pair(6, [&results[16], &results[17]]);
+        pd.give_pair(8, [&results[18], &results[19]]);
     }
 
     /// Velocities from momenta.
@@ -1769,16 +1759,11 @@ impl Chain10Planar {
             results[8][l] = link9_v;
             results[9][l] = link10_v;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        v.give(2, &results[2]);
-        v.give(3, &results[3]);
-        v.give(4, &results[4]);
-        v.give(5, &results[5]);
-        v.give(6, &results[6]);
-        v.give(7, &results[7]);
-        v.give(8, &results[8]);
-        v.give(9, &results[9]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        v.give_pair(2, [&results[2], &results[3]]);
+        v.give_pair(4, [&results[4], &results[5]]);
+        v.give_pair(6, [&results[6], &results[7]]);
+        v.give_pair(8, [&results[8], &results[9]]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -2091,16 +2076,11 @@ impl Chain10Planar {
             results[8][l] = link9_p_rz;
             results[9][l] = link10_p_rz;
         }
-        p.give(0, &results[0]);
-        p.give(1, &results[1]);
-        p.give(2, &results[2]);
-        p.give(3, &results[3]);
-        p.give(4, &results[4]);
-        p.give(5, &results[5]);
-        p.give(6, &results[6]);
-        p.give(7, &results[7]);
-        p.give(8, &results[8]);
-        p.give(9, &results[9]);
+        p.give_pair(0, [&results[0], &results[1]]);
+        p.give_pair(2, [&results[2], &results[3]]);
+        p.give_pair(4, [&results[4], &results[5]]);
+        p.give_pair(6, [&results[6], &results[7]]);
+        p.give_pair(8, [&results[8], &results[9]]);
     }
 
     /// Kinetic and potential energy, J.
@@ -2834,8 +2814,7 @@ impl Chain10Planar {
             results[0][l] = -minus_energy_0;
             results[1][l] = energy_1;
         }
-        energy.give(0, &results[0]);
-        energy.give(1, &results[1]);
+        energy.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
@@ -3620,16 +3599,11 @@ impl Chain10Planar {
             results[8][l] = link9_a;
             results[9][l] = link10_a;
         }
-        a.give(0, &results[0]);
-        a.give(1, &results[1]);
-        a.give(2, &results[2]);
-        a.give(3, &results[3]);
-        a.give(4, &results[4]);
-        a.give(5, &results[5]);
-        a.give(6, &results[6]);
-        a.give(7, &results[7]);
-        a.give(8, &results[8]);
-        a.give(9, &results[9]);
+        a.give_pair(0, [&results[0], &results[1]]);
+        a.give_pair(2, [&results[2], &results[3]]);
+        a.give_pair(4, [&results[4], &results[5]]);
+        a.give_pair(6, [&results[6], &results[7]]);
+        a.give_pair(8, [&results[8], &results[9]]);
     }
 
     /// Mass matrix, by rows.
@@ -4137,106 +4111,56 @@ impl Chain10Planar {
             results[98][l] = m_8_9;
             results[99][l] = 0.00835;
         }
-        m.give(0, &results[0]);
-        m.give(1, &results[1]);
-        m.give(2, &results[2]);
-        m.give(3, &results[3]);
-        m.give(4, &results[4]);
-        m.give(5, &results[5]);
-        m.give(6, &results[6]);
-        m.give(7, &results[7]);
-        m.give(8, &results[8]);
-        m.give(9, &results[9]);
-        m.give(10, &results[10]);
-        m.give(11, &results[11]);
-        m.give(12, &results[12]);
-        m.give(13, &results[13]);
-        m.give(14, &results[14]);
-        m.give(15, &results[15]);
-        m.give(16, &results[16]);
-        m.give(17, &results[17]);
-        m.give(18, &results[18]);
-        m.give(19, &results[19]);
-        m.give(20, &results[20]);
-        m.give(21, &results[21]);
-        m.give(22, &results[22]);
-        m.give(23, &results[23]);
-        m.give(24, &results[24]);
-        m.give(25, &results[25]);
-        m.give(26, &results[26]);
-        m.give(27, &results[27]);
-        m.give(28, &results[28]);
-        m.give(29, &results[29]);
-        m.give(30, &results[30]);
-        m.give(31, &results[31]);
-        m.give(32, &results[32]);
-        m.give(33, &results[33]);
-        m.give(34, &results[34]);
-        m.give(35, &results[35]);
-        m.give(36, &results[36]);
-        m.give(37, &results[37]);
-        m.give(38, &results[38]);
-        m.give(39, &results[39]);
-        m.give(40, &results[40]);
-        m.give(41, &results[41]);
-        m.give(42, &results[42]);
-        m.give(43, &results[43]);
-        m.give(44, &results[44]);
-        m.give(45, &results[45]);
-        m.give(46, &results[46]);
-        m.give(47, &results[47]);
-        m.give(48, &results[48]);
-        m.give(49, &results[49]);
-        m.give(50, &results[50]);
-        m.give(51, &results[51]);
-        m.give(52, &results[52]);
-        m.give(53, &results[53]);
-        m.give(54, &results[54]);
-        m.give(55, &results[55]);
-        m.give(56, &results[56]);
-        m.give(57, &results[57]);
-        m.give(58, &results[58]);
-        m.give(59, &results[59]);
-        m.give(60, &results[60]);
-        m.give(61, &results[61]);
-        m.give(62, &results[62]);
-        m.give(63, &results[63]);
-        m.give(64, &results[64]);
-        m.give(65, &results[65]);
-        m.give(66, &results[66]);
-        m.give(67, &results[67]);
-        m.give(68, &results[68]);
-        m.give(69, &results[69]);
-        m.give(70, &results[70]);
-        m.give(71, &results[71]);
-        m.give(72, &results[72]);
-        m.give(73, &results[73]);
-        m.give(74, &results[74]);
-        m.give(75, &results[75]);
-        m.give(76, &results[76]);
-        m.give(77, &results[77]);
-        m.give(78, &results[78]);
-        m.give(79, &results[79]);
-        m.give(80, &results[80]);
-        m.give(81, &results[81]);
-        m.give(82, &results[82]);
-        m.give(83, &results[83]);
-        m.give(84, &results[84]);
-        m.give(85, &results[85]);
-        m.give(86, &results[86]);
-        m.give(87, &results[87]);
-        m.give(88, &results[88]);
-        m.give(89, &results[89]);
-        m.give(90, &results[90]);
-        m.give(91, &results[91]);
-        m.give(92, &results[92]);
-        m.give(93, &results[93]);
-        m.give(94, &results[94]);
-        m.give(95, &results[95]);
-        m.give(96, &results[96]);
-        m.give(97, &results[97]);
-        m.give(98, &results[98]);
-        m.give(99, &results[99]);
+        m.give_pair(0, [&results[0], &results[1]]);
+        m.give_pair(2, [&results[2], &results[3]]);
+        m.give_pair(4, [&results[4], &results[5]]);
+        m.give_pair(6, [&results[6], &results[7]]);
+        m.give_pair(8, [&results[8], &results[9]]);
+        m.give_pair(10, [&results[10], &results[11]]);
+        m.give_pair(12, [&results[12], &results[13]]);
+        m.give_pair(14, [&results[14], &results[15]]);
+        m.give_pair(16, [&results[16], &results[17]]);
+        m.give_pair(18, [&results[18], &results[19]]);
+        m.give_pair(20, [&results[20], &results[21]]);
+        m.give_pair(22, [&results[22], &results[23]]);
+        m.give_pair(24, [&results[24], &results[25]]);
+        m.give_pair(26, [&results[26], &results[27]]);
+        m.give_pair(28, [&results[28], &results[29]]);
+        m.give_pair(30, [&results[30], &results[31]]);
+        m.give_pair(32, [&results[32], &results[33]]);
+        m.give_pair(34, [&results[34], &results[35]]);
+        m.give_pair(36, [&results[36], &results[37]]);
+        m.give_pair(38, [&results[38], &results[39]]);
+        m.give_pair(40, [&results[40], &results[41]]);
+        m.give_pair(42, [&results[42], &results[43]]);
+        m.give_pair(44, [&results[44], &results[45]]);
+        m.give_pair(46, [&results[46], &results[47]]);
+        m.give_pair(48, [&results[48], &results[49]]);
+        m.give_pair(50, [&results[50], &results[51]]);
+        m.give_pair(52, [&results[52], &results[53]]);
+        m.give_pair(54, [&results[54], &results[55]]);
+        m.give_pair(56, [&results[56], &results[57]]);
+        m.give_pair(58, [&results[58], &results[59]]);
+        m.give_pair(60, [&results[60], &results[61]]);
+        m.give_pair(62, [&results[62], &results[63]]);
+        m.give_pair(64, [&results[64], &results[65]]);
+        m.give_pair(66, [&results[66], &results[67]]);
+        m.give_pair(68, [&results[68], &results[69]]);
+        m.give_pair(70, [&results[70], &results[71]]);
+        m.give_pair(72, [&results[72], &results[73]]);
+        m.give_pair(74, [&results[74], &results[75]]);
+        m.give_pair(76, [&results[76], &results[77]]);
+        m.give_pair(78, [&results[78], &results[79]]);
+        m.give_pair(80, [&results[80], &results[81]]);
+        m.give_pair(82, [&results[82], &results[83]]);
+        m.give_pair(84, [&results[84], &results[85]]);
+        m.give_pair(86, [&results[86], &results[87]]);
+        m.give_pair(88, [&results[88], &results[89]]);
+        m.give_pair(90, [&results[90], &results[91]]);
+        m.give_pair(92, [&results[92], &results[93]]);
+        m.give_pair(94, [&results[94], &results[95]]);
+        m.give_pair(96, [&results[96], &results[97]]);
+        m.give_pair(98, [&results[98], &results[99]]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`.
@@ -4651,16 +4575,11 @@ impl Chain10Planar {
             results[8][l] = tau_8;
             results[9][l] = link10_f_rz;
         }
-        tau.give(0, &results[0]);
-        tau.give(1, &results[1]);
-        tau.give(2, &results[2]);
-        tau.give(3, &results[3]);
-        tau.give(4, &results[4]);
-        tau.give(5, &results[5]);
-        tau.give(6, &results[6]);
-        tau.give(7, &results[7]);
-        tau.give(8, &results[8]);
-        tau.give(9, &results[9]);
+        tau.give_pair(0, [&results[0], &results[1]]);
+        tau.give_pair(2, [&results[2], &results[3]]);
+        tau.give_pair(4, [&results[4], &results[5]]);
+        tau.give_pair(6, [&results[6], &results[7]]);
+        tau.give_pair(8, [&results[8], &results[9]]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`.
@@ -4979,16 +4898,11 @@ impl Chain10Planar {
             results[8][l] = h_8;
             results[9][l] = link10_f_rz;
         }
-        h.give(0, &results[0]);
-        h.give(1, &results[1]);
-        h.give(2, &results[2]);
-        h.give(3, &results[3]);
-        h.give(4, &results[4]);
-        h.give(5, &results[5]);
-        h.give(6, &results[6]);
-        h.give(7, &results[7]);
-        h.give(8, &results[8]);
-        h.give(9, &results[9]);
+        h.give_pair(0, [&results[0], &results[1]]);
+        h.give_pair(2, [&results[2], &results[3]]);
+        h.give_pair(4, [&results[4], &results[5]]);
+        h.give_pair(6, [&results[6], &results[7]]);
+        h.give_pair(8, [&results[8], &results[9]]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -5033,16 +4947,11 @@ impl Chain10Planar {
             results[8][l] = v_8;
             results[9][l] = v_9;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
-        qd.give(6, &results[6]);
-        qd.give(7, &results[7]);
-        qd.give(8, &results[8]);
-        qd.give(9, &results[9]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
+        qd.give_pair(6, [&results[6], &results[7]]);
+        qd.give_pair(8, [&results[8], &results[9]]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -1330,18 +1330,12 @@ impl Chain6 {
             results[10][l] = pd_4;
             results[11][l] = pd_5;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
-        pd.give(0, &results[6]);
-        pd.give(1, &results[7]);
-        pd.give(2, &results[8]);
-        pd.give(3, &results[9]);
-        pd.give(4, &results[10]);
-        pd.give(5, &results[11]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
+        pd.give_pair(0, [&results[6], &results[7]]);
+        pd.give_pair(2, [&results[8], &results[9]]);
+        pd.give_pair(4, [&results[10], &results[11]]);
     }
 
     /// Velocities from momenta.
@@ -2132,12 +2126,9 @@ impl Chain6 {
             results[4][l] = -link5_minus_v;
             results[5][l] = link6_v;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        v.give(2, &results[2]);
-        v.give(3, &results[3]);
-        v.give(4, &results[4]);
-        v.give(5, &results[5]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        v.give_pair(2, [&results[2], &results[3]]);
+        v.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -2654,12 +2645,9 @@ impl Chain6 {
             results[4][l] = link5_p_rz;
             results[5][l] = -link6_minus_p_rz;
         }
-        p.give(0, &results[0]);
-        p.give(1, &results[1]);
-        p.give(2, &results[2]);
-        p.give(3, &results[3]);
-        p.give(4, &results[4]);
-        p.give(5, &results[5]);
+        p.give_pair(0, [&results[0], &results[1]]);
+        p.give_pair(2, [&results[2], &results[3]]);
+        p.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// Kinetic and potential energy, J.
@@ -3485,8 +3473,7 @@ impl Chain6 {
             results[0][l] = energy_0;
             results[1][l] = energy_1;
         }
-        energy.give(0, &results[0]);
-        energy.give(1, &results[1]);
+        energy.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
@@ -4989,12 +4976,9 @@ impl Chain6 {
             results[4][l] = a_4;
             results[5][l] = a_5;
         }
-        a.give(0, &results[0]);
-        a.give(1, &results[1]);
-        a.give(2, &results[2]);
-        a.give(3, &results[3]);
-        a.give(4, &results[4]);
-        a.give(5, &results[5]);
+        a.give_pair(0, [&results[0], &results[1]]);
+        a.give_pair(2, [&results[2], &results[3]]);
+        a.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -5027,12 +5011,9 @@ impl Chain6 {
             results[4][l] = v_4;
             results[5][l] = v_5;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -144,10 +144,8 @@ impl DoublePendulum {
             results[2][l] = pd_0;
             results[3][l] = pd_1;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        pd.give(0, &results[2]);
-        pd.give(1, &results[3]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        pd.give_pair(0, [&results[2], &results[3]]);
     }
 
     /// Velocities from momenta.
@@ -196,8 +194,7 @@ impl DoublePendulum {
             results[0][l] = upper_e;
             results[1][l] = lower_v;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
+        v.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -240,8 +237,7 @@ impl DoublePendulum {
             results[0][l] = upper_p_rz;
             results[1][l] = lower_p_rz;
         }
-        p.give(0, &results[0]);
-        p.give(1, &results[1]);
+        p.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Kinetic and potential energy, J.
@@ -312,8 +308,7 @@ impl DoublePendulum {
             results[0][l] = energy_0;
             results[1][l] = energy_1;
         }
-        energy.give(0, &results[0]);
-        energy.give(1, &results[1]);
+        energy.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
@@ -393,8 +388,7 @@ impl DoublePendulum {
             results[0][l] = -upper_minus_e;
             results[1][l] = lower_a;
         }
-        a.give(0, &results[0]);
-        a.give(1, &results[1]);
+        a.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Wrench `[force; moment]` that each joint transmits to its child, in the child's body frame, N and N m.
@@ -518,18 +512,12 @@ impl DoublePendulum {
             results[10][l] = -lower_minus_f_rz;
             results[11][l] = 0.0;
         }
-        reactions.give(0, &results[0]);
-        reactions.give(1, &results[1]);
-        reactions.give(2, &results[2]);
-        reactions.give(3, &results[3]);
-        reactions.give(4, &results[4]);
-        reactions.give(5, &results[5]);
-        reactions.give(6, &results[6]);
-        reactions.give(7, &results[7]);
-        reactions.give(8, &results[8]);
-        reactions.give(9, &results[9]);
-        reactions.give(10, &results[10]);
-        reactions.give(11, &results[11]);
+        reactions.give_pair(0, [&results[0], &results[1]]);
+        reactions.give_pair(2, [&results[2], &results[3]]);
+        reactions.give_pair(4, [&results[4], &results[5]]);
+        reactions.give_pair(6, [&results[6], &results[7]]);
+        reactions.give_pair(8, [&results[8], &results[9]]);
+        reactions.give_pair(10, [&results[10], &results[11]]);
     }
 
     /// Mass matrix, by rows.
@@ -562,10 +550,8 @@ impl DoublePendulum {
             results[2][l] = m_0_1;
             results[3][l] = 0.33340000000000003;
         }
-        m.give(0, &results[0]);
-        m.give(1, &results[1]);
-        m.give(2, &results[2]);
-        m.give(3, &results[3]);
+        m.give_pair(0, [&results[0], &results[1]]);
+        m.give_pair(2, [&results[2], &results[3]]);
     }
 
     /// Rotation, position and velocity of frames. The rotation takes components in the frame's axes to ground axes; the
@@ -669,60 +655,34 @@ impl DoublePendulum {
             results[52][l] = lower_omega_rz;
             results[53][l] = 0.0;
         }
-        rotation.give(0, &results[0]);
-        rotation.give(1, &results[1]);
-        rotation.give(2, &results[2]);
-        rotation.give(3, &results[3]);
-        rotation.give(4, &results[4]);
-        rotation.give(5, &results[5]);
-        rotation.give(6, &results[6]);
-        rotation.give(7, &results[7]);
-        rotation.give(8, &results[8]);
-        rotation.give(9, &results[9]);
-        rotation.give(10, &results[10]);
-        rotation.give(11, &results[11]);
-        rotation.give(12, &results[12]);
-        rotation.give(13, &results[13]);
-        rotation.give(14, &results[14]);
-        rotation.give(15, &results[15]);
-        rotation.give(16, &results[16]);
-        rotation.give(17, &results[17]);
-        rotation.give(18, &results[18]);
-        rotation.give(19, &results[19]);
-        rotation.give(20, &results[20]);
-        rotation.give(21, &results[21]);
-        rotation.give(22, &results[22]);
-        rotation.give(23, &results[23]);
-        rotation.give(24, &results[24]);
-        rotation.give(25, &results[25]);
+        rotation.give_pair(0, [&results[0], &results[1]]);
+        rotation.give_pair(2, [&results[2], &results[3]]);
+        rotation.give_pair(4, [&results[4], &results[5]]);
+        rotation.give_pair(6, [&results[6], &results[7]]);
+        rotation.give_pair(8, [&results[8], &results[9]]);
+        rotation.give_pair(10, [&results[10], &results[11]]);
+        rotation.give_pair(12, [&results[12], &results[13]]);
+        rotation.give_pair(14, [&results[14], &results[15]]);
+        rotation.give_pair(16, [&results[16], &results[17]]);
+        rotation.give_pair(18, [&results[18], &results[19]]);
+        rotation.give_pair(20, [&results[20], &results[21]]);
+        rotation.give_pair(22, [&results[22], &results[23]]);
+        rotation.give_pair(24, [&results[24], &results[25]]);
         rotation.give(26, &results[26]);
-        position.give(0, &results[27]);
-        position.give(1, &results[28]);
-        position.give(2, &results[29]);
-        position.give(3, &results[30]);
-        position.give(4, &results[31]);
-        position.give(5, &results[32]);
-        position.give(6, &results[33]);
-        position.give(7, &results[34]);
+        position.give_pair(0, [&results[27], &results[28]]);
+        position.give_pair(2, [&results[29], &results[30]]);
+        position.give_pair(4, [&results[31], &results[32]]);
+        position.give_pair(6, [&results[33], &results[34]]);
         position.give(8, &results[35]);
-        velocity.give(0, &results[36]);
-        velocity.give(1, &results[37]);
-        velocity.give(2, &results[38]);
-        velocity.give(3, &results[39]);
-        velocity.give(4, &results[40]);
-        velocity.give(5, &results[41]);
-        velocity.give(6, &results[42]);
-        velocity.give(7, &results[43]);
-        velocity.give(8, &results[44]);
-        velocity.give(9, &results[45]);
-        velocity.give(10, &results[46]);
-        velocity.give(11, &results[47]);
-        velocity.give(12, &results[48]);
-        velocity.give(13, &results[49]);
-        velocity.give(14, &results[50]);
-        velocity.give(15, &results[51]);
-        velocity.give(16, &results[52]);
-        velocity.give(17, &results[53]);
+        velocity.give_pair(0, [&results[36], &results[37]]);
+        velocity.give_pair(2, [&results[38], &results[39]]);
+        velocity.give_pair(4, [&results[40], &results[41]]);
+        velocity.give_pair(6, [&results[42], &results[43]]);
+        velocity.give_pair(8, [&results[44], &results[45]]);
+        velocity.give_pair(10, [&results[46], &results[47]]);
+        velocity.give_pair(12, [&results[48], &results[49]]);
+        velocity.give_pair(14, [&results[50], &results[51]]);
+        velocity.give_pair(16, [&results[52], &results[53]]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`.
@@ -792,8 +752,7 @@ impl DoublePendulum {
             results[0][l] = tau_0;
             results[1][l] = lower_f_rz;
         }
-        tau.give(0, &results[0]);
-        tau.give(1, &results[1]);
+        tau.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`.
@@ -849,8 +808,7 @@ impl DoublePendulum {
             results[0][l] = h_0;
             results[1][l] = lower_f_rz;
         }
-        h.give(0, &results[0]);
-        h.give(1, &results[1]);
+        h.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Jacobians `J` of frames.
@@ -920,42 +878,24 @@ impl DoublePendulum {
             results[34][l] = 0.0;
             results[35][l] = 0.0;
         }
-        jacobian.give(0, &results[0]);
-        jacobian.give(1, &results[1]);
-        jacobian.give(2, &results[2]);
-        jacobian.give(3, &results[3]);
-        jacobian.give(4, &results[4]);
-        jacobian.give(5, &results[5]);
-        jacobian.give(6, &results[6]);
-        jacobian.give(7, &results[7]);
-        jacobian.give(8, &results[8]);
-        jacobian.give(9, &results[9]);
-        jacobian.give(10, &results[10]);
-        jacobian.give(11, &results[11]);
-        jacobian.give(12, &results[12]);
-        jacobian.give(13, &results[13]);
-        jacobian.give(14, &results[14]);
-        jacobian.give(15, &results[15]);
-        jacobian.give(16, &results[16]);
-        jacobian.give(17, &results[17]);
-        jacobian.give(18, &results[18]);
-        jacobian.give(19, &results[19]);
-        jacobian.give(20, &results[20]);
-        jacobian.give(21, &results[21]);
-        jacobian.give(22, &results[22]);
-        jacobian.give(23, &results[23]);
-        jacobian.give(24, &results[24]);
-        jacobian.give(25, &results[25]);
-        jacobian.give(26, &results[26]);
-        jacobian.give(27, &results[27]);
-        jacobian.give(28, &results[28]);
-        jacobian.give(29, &results[29]);
-        jacobian.give(30, &results[30]);
-        jacobian.give(31, &results[31]);
-        jacobian.give(32, &results[32]);
-        jacobian.give(33, &results[33]);
-        jacobian.give(34, &results[34]);
-        jacobian.give(35, &results[35]);
+        jacobian.give_pair(0, [&results[0], &results[1]]);
+        jacobian.give_pair(2, [&results[2], &results[3]]);
+        jacobian.give_pair(4, [&results[4], &results[5]]);
+        jacobian.give_pair(6, [&results[6], &results[7]]);
+        jacobian.give_pair(8, [&results[8], &results[9]]);
+        jacobian.give_pair(10, [&results[10], &results[11]]);
+        jacobian.give_pair(12, [&results[12], &results[13]]);
+        jacobian.give_pair(14, [&results[14], &results[15]]);
+        jacobian.give_pair(16, [&results[16], &results[17]]);
+        jacobian.give_pair(18, [&results[18], &results[19]]);
+        jacobian.give_pair(20, [&results[20], &results[21]]);
+        jacobian.give_pair(22, [&results[22], &results[23]]);
+        jacobian.give_pair(24, [&results[24], &results[25]]);
+        jacobian.give_pair(26, [&results[26], &results[27]]);
+        jacobian.give_pair(28, [&results[28], &results[29]]);
+        jacobian.give_pair(30, [&results[30], &results[31]]);
+        jacobian.give_pair(32, [&results[32], &results[33]]);
+        jacobian.give_pair(34, [&results[34], &results[35]]);
     }
 
     /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
@@ -1012,24 +952,15 @@ impl DoublePendulum {
             results[16][l] = 0.0;
             results[17][l] = 0.0;
         }
-        bias.give(0, &results[0]);
-        bias.give(1, &results[1]);
-        bias.give(2, &results[2]);
-        bias.give(3, &results[3]);
-        bias.give(4, &results[4]);
-        bias.give(5, &results[5]);
-        bias.give(6, &results[6]);
-        bias.give(7, &results[7]);
-        bias.give(8, &results[8]);
-        bias.give(9, &results[9]);
-        bias.give(10, &results[10]);
-        bias.give(11, &results[11]);
-        bias.give(12, &results[12]);
-        bias.give(13, &results[13]);
-        bias.give(14, &results[14]);
-        bias.give(15, &results[15]);
-        bias.give(16, &results[16]);
-        bias.give(17, &results[17]);
+        bias.give_pair(0, [&results[0], &results[1]]);
+        bias.give_pair(2, [&results[2], &results[3]]);
+        bias.give_pair(4, [&results[4], &results[5]]);
+        bias.give_pair(6, [&results[6], &results[7]]);
+        bias.give_pair(8, [&results[8], &results[9]]);
+        bias.give_pair(10, [&results[10], &results[11]]);
+        bias.give_pair(12, [&results[12], &results[13]]);
+        bias.give_pair(14, [&results[14], &results[15]]);
+        bias.give_pair(16, [&results[16], &results[17]]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -1050,8 +981,7 @@ impl DoublePendulum {
             results[0][l] = v_0;
             results[1][l] = v_1;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
+        qd.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -206,10 +206,8 @@ impl Hopper {
             results[2][l] = pd_0;
             results[3][l] = pd_1;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        pd.give(0, &results[2]);
-        pd.give(1, &results[3]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        pd.give_pair(0, [&results[2], &results[3]]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -237,8 +235,7 @@ impl Hopper {
             results[0][l] = foot_p_z;
             results[1][l] = trunk_omega_z;
         }
-        p.give(0, &results[0]);
-        p.give(1, &results[1]);
+        p.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Kinetic and potential energy, J.
@@ -337,8 +334,7 @@ impl Hopper {
             results[0][l] = energy_0;
             results[1][l] = energy_1;
         }
-        energy.give(0, &results[0]);
-        energy.give(1, &results[1]);
+        energy.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Residuals `φ(q)` of the constraints, rad or m, and the entries of their Jacobian `Φ(q)`.
@@ -381,15 +377,11 @@ impl Hopper {
             results[8][l] = acts_3;
             results[9][l] = -acts_4;
         }
-        residual.give(0, &results[0]);
-        residual.give(1, &results[1]);
-        residual.give(2, &results[2]);
-        residual.give(3, &results[3]);
+        residual.give_pair(0, [&results[0], &results[1]]);
+        residual.give_pair(2, [&results[2], &results[3]]);
         residual.give(4, &results[4]);
-        jacobian.give(0, &results[5]);
-        jacobian.give(1, &results[6]);
-        jacobian.give(2, &results[7]);
-        jacobian.give(3, &results[8]);
+        jacobian.give_pair(0, [&results[5], &results[6]]);
+        jacobian.give_pair(2, [&results[7], &results[8]]);
         jacobian.give(4, &results[9]);
     }
 
@@ -494,14 +486,10 @@ impl Hopper {
             results[7][l] = sigma_3;
             results[8][l] = -minus_sigma_4;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        freed.give(0, &results[2]);
-        freed.give(1, &results[3]);
-        sigma.give(0, &results[4]);
-        sigma.give(1, &results[5]);
-        sigma.give(2, &results[6]);
-        sigma.give(3, &results[7]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        freed.give_pair(0, [&results[2], &results[3]]);
+        sigma.give_pair(0, [&results[4], &results[5]]);
+        sigma.give_pair(2, [&results[6], &results[7]]);
         sigma.give(4, &results[8]);
     }
 
@@ -597,17 +585,12 @@ impl Hopper {
             results[10][l] = pivots_3;
             results[11][l] = pivots_4;
         }
-        residual.give(0, &results[0]);
-        residual.give(1, &results[1]);
-        residual.give(2, &results[2]);
-        residual.give(3, &results[3]);
+        residual.give_pair(0, [&results[0], &results[1]]);
+        residual.give_pair(2, [&results[2], &results[3]]);
         residual.give(4, &results[4]);
-        dq.give(0, &results[5]);
-        dq.give(1, &results[6]);
-        pivots.give(0, &results[7]);
-        pivots.give(1, &results[8]);
-        pivots.give(2, &results[9]);
-        pivots.give(3, &results[10]);
+        dq.give_pair(0, [&results[5], &results[6]]);
+        pivots.give_pair(0, [&results[7], &results[8]]);
+        pivots.give_pair(2, [&results[9], &results[10]]);
         pivots.give(4, &results[11]);
     }
 
@@ -708,10 +691,8 @@ impl Hopper {
             results[3][l] = lambda_3;
             results[4][l] = -minus_lambda_4;
         }
-        lambda.give(0, &results[0]);
-        lambda.give(1, &results[1]);
-        lambda.give(2, &results[2]);
-        lambda.give(3, &results[3]);
+        lambda.give_pair(0, [&results[0], &results[1]]);
+        lambda.give_pair(2, [&results[2], &results[3]]);
         lambda.give(4, &results[4]);
     }
 
@@ -756,20 +737,14 @@ impl Hopper {
             results[13][l] = 1.0;
             results[14][l] = -1.0;
         }
-        gaps.give(0, &results[0]);
-        gaps.give(1, &results[1]);
-        gaps.give(2, &results[2]);
-        gaps.give(3, &results[3]);
+        gaps.give_pair(0, [&results[0], &results[1]]);
+        gaps.give_pair(2, [&results[2], &results[3]]);
         gaps.give(4, &results[4]);
-        velocities.give(0, &results[5]);
-        velocities.give(1, &results[6]);
-        velocities.give(2, &results[7]);
-        velocities.give(3, &results[8]);
+        velocities.give_pair(0, [&results[5], &results[6]]);
+        velocities.give_pair(2, [&results[7], &results[8]]);
         velocities.give(4, &results[9]);
-        jacobian.give(0, &results[10]);
-        jacobian.give(1, &results[11]);
-        jacobian.give(2, &results[12]);
-        jacobian.give(3, &results[13]);
+        jacobian.give_pair(0, [&results[10], &results[11]]);
+        jacobian.give_pair(2, [&results[12], &results[13]]);
         jacobian.give(4, &results[14]);
     }
 
@@ -791,8 +766,7 @@ impl Hopper {
             results[0][l] = v_0;
             results[1][l] = v_1;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
+        qd.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
@@ -832,10 +806,8 @@ impl Hopper {
             results[2][l] = pd_0;
             results[3][l] = pd_1;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        pd.give(0, &results[2]);
-        pd.give(1, &results[3]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        pd.give_pair(0, [&results[2], &results[3]]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -869,14 +841,10 @@ impl Hopper {
             results[7][l] = 0.0;
             results[8][l] = 0.0;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        freed.give(0, &results[2]);
-        freed.give(1, &results[3]);
-        sigma.give(0, &results[4]);
-        sigma.give(1, &results[5]);
-        sigma.give(2, &results[6]);
-        sigma.give(3, &results[7]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        freed.give_pair(0, [&results[2], &results[3]]);
+        sigma.give_pair(0, [&results[4], &results[5]]);
+        sigma.give_pair(2, [&results[6], &results[7]]);
         sigma.give(4, &results[8]);
     }
 
@@ -897,10 +865,8 @@ impl Hopper {
             results[3][l] = 0.0;
             results[4][l] = 0.0;
         }
-        lambda.give(0, &results[0]);
-        lambda.give(1, &results[1]);
-        lambda.give(2, &results[2]);
-        lambda.give(3, &results[3]);
+        lambda.give_pair(0, [&results[0], &results[1]]);
+        lambda.give_pair(2, [&results[2], &results[3]]);
         lambda.give(4, &results[4]);
     }
 
@@ -936,10 +902,8 @@ impl Hopper {
             results[2][l] = pd_0;
             results[3][l] = pd_1;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        pd.give(0, &results[2]);
-        pd.give(1, &results[3]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        pd.give_pair(0, [&results[2], &results[3]]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -974,14 +938,10 @@ impl Hopper {
             results[7][l] = 0.0;
             results[8][l] = -minus_sigma_4;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        freed.give(0, &results[2]);
-        freed.give(1, &results[3]);
-        sigma.give(0, &results[4]);
-        sigma.give(1, &results[5]);
-        sigma.give(2, &results[6]);
-        sigma.give(3, &results[7]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        freed.give_pair(0, [&results[2], &results[3]]);
+        sigma.give_pair(0, [&results[4], &results[5]]);
+        sigma.give_pair(2, [&results[6], &results[7]]);
         sigma.give(4, &results[8]);
     }
 
@@ -1017,10 +977,8 @@ impl Hopper {
             results[3][l] = 0.0;
             results[4][l] = lambda_4;
         }
-        lambda.give(0, &results[0]);
-        lambda.give(1, &results[1]);
-        lambda.give(2, &results[2]);
-        lambda.give(3, &results[3]);
+        lambda.give_pair(0, [&results[0], &results[1]]);
+        lambda.give_pair(2, [&results[2], &results[3]]);
         lambda.give(4, &results[4]);
     }
 
@@ -1056,10 +1014,8 @@ impl Hopper {
             results[2][l] = pd_0;
             results[3][l] = pd_1;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        pd.give(0, &results[2]);
-        pd.give(1, &results[3]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        pd.give_pair(0, [&results[2], &results[3]]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -1094,14 +1050,10 @@ impl Hopper {
             results[7][l] = sigma_3;
             results[8][l] = 0.0;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        freed.give(0, &results[2]);
-        freed.give(1, &results[3]);
-        sigma.give(0, &results[4]);
-        sigma.give(1, &results[5]);
-        sigma.give(2, &results[6]);
-        sigma.give(3, &results[7]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        freed.give_pair(0, [&results[2], &results[3]]);
+        sigma.give_pair(0, [&results[4], &results[5]]);
+        sigma.give_pair(2, [&results[6], &results[7]]);
         sigma.give(4, &results[8]);
     }
 
@@ -1137,10 +1089,8 @@ impl Hopper {
             results[3][l] = lambda_3;
             results[4][l] = 0.0;
         }
-        lambda.give(0, &results[0]);
-        lambda.give(1, &results[1]);
-        lambda.give(2, &results[2]);
-        lambda.give(3, &results[3]);
+        lambda.give_pair(0, [&results[0], &results[1]]);
+        lambda.give_pair(2, [&results[2], &results[3]]);
         lambda.give(4, &results[4]);
     }
 
@@ -1184,10 +1134,8 @@ impl Hopper {
             results[2][l] = pd_0;
             results[3][l] = pd_1;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        pd.give(0, &results[2]);
-        pd.give(1, &results[3]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        pd.give_pair(0, [&results[2], &results[3]]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -1226,14 +1174,10 @@ impl Hopper {
             results[7][l] = 0.0;
             results[8][l] = 0.0;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        freed.give(0, &results[2]);
-        freed.give(1, &results[3]);
-        sigma.give(0, &results[4]);
-        sigma.give(1, &results[5]);
-        sigma.give(2, &results[6]);
-        sigma.give(3, &results[7]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        freed.give_pair(0, [&results[2], &results[3]]);
+        sigma.give_pair(0, [&results[4], &results[5]]);
+        sigma.give_pair(2, [&results[6], &results[7]]);
         sigma.give(4, &results[8]);
     }
 
@@ -1270,10 +1214,8 @@ impl Hopper {
             results[3][l] = 0.0;
             results[4][l] = 0.0;
         }
-        lambda.give(0, &results[0]);
-        lambda.give(1, &results[1]);
-        lambda.give(2, &results[2]);
-        lambda.give(3, &results[3]);
+        lambda.give_pair(0, [&results[0], &results[1]]);
+        lambda.give_pair(2, [&results[2], &results[3]]);
         lambda.give(4, &results[4]);
     }
 
@@ -1309,10 +1251,8 @@ impl Hopper {
             results[2][l] = pd_0;
             results[3][l] = pd_1;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        pd.give(0, &results[2]);
-        pd.give(1, &results[3]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        pd.give_pair(0, [&results[2], &results[3]]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -1347,14 +1287,10 @@ impl Hopper {
             results[7][l] = sigma_3;
             results[8][l] = 0.0;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        freed.give(0, &results[2]);
-        freed.give(1, &results[3]);
-        sigma.give(0, &results[4]);
-        sigma.give(1, &results[5]);
-        sigma.give(2, &results[6]);
-        sigma.give(3, &results[7]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        freed.give_pair(0, [&results[2], &results[3]]);
+        sigma.give_pair(0, [&results[4], &results[5]]);
+        sigma.give_pair(2, [&results[6], &results[7]]);
         sigma.give(4, &results[8]);
     }
 
@@ -1390,10 +1326,8 @@ impl Hopper {
             results[3][l] = lambda_3;
             results[4][l] = 0.0;
         }
-        lambda.give(0, &results[0]);
-        lambda.give(1, &results[1]);
-        lambda.give(2, &results[2]);
-        lambda.give(3, &results[3]);
+        lambda.give_pair(0, [&results[0], &results[1]]);
+        lambda.give_pair(2, [&results[2], &results[3]]);
         lambda.give(4, &results[4]);
     }
 
@@ -1433,10 +1367,8 @@ impl Hopper {
             results[2][l] = pd_0;
             results[3][l] = pd_1;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        pd.give(0, &results[2]);
-        pd.give(1, &results[3]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        pd.give_pair(0, [&results[2], &results[3]]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -1476,14 +1408,10 @@ impl Hopper {
             results[7][l] = 0.0;
             results[8][l] = -minus_sigma_4;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        freed.give(0, &results[2]);
-        freed.give(1, &results[3]);
-        sigma.give(0, &results[4]);
-        sigma.give(1, &results[5]);
-        sigma.give(2, &results[6]);
-        sigma.give(3, &results[7]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        freed.give_pair(0, [&results[2], &results[3]]);
+        sigma.give_pair(0, [&results[4], &results[5]]);
+        sigma.give_pair(2, [&results[6], &results[7]]);
         sigma.give(4, &results[8]);
     }
 
@@ -1523,10 +1451,8 @@ impl Hopper {
             results[3][l] = 0.0;
             results[4][l] = lambda_4;
         }
-        lambda.give(0, &results[0]);
-        lambda.give(1, &results[1]);
-        lambda.give(2, &results[2]);
-        lambda.give(3, &results[3]);
+        lambda.give_pair(0, [&results[0], &results[1]]);
+        lambda.give_pair(2, [&results[2], &results[3]]);
         lambda.give(4, &results[4]);
     }
 
@@ -1566,10 +1492,8 @@ impl Hopper {
             results[2][l] = pd_0;
             results[3][l] = pd_1;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        pd.give(0, &results[2]);
-        pd.give(1, &results[3]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        pd.give_pair(0, [&results[2], &results[3]]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -1609,14 +1533,10 @@ impl Hopper {
             results[7][l] = sigma_3;
             results[8][l] = 0.0;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        freed.give(0, &results[2]);
-        freed.give(1, &results[3]);
-        sigma.give(0, &results[4]);
-        sigma.give(1, &results[5]);
-        sigma.give(2, &results[6]);
-        sigma.give(3, &results[7]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        freed.give_pair(0, [&results[2], &results[3]]);
+        sigma.give_pair(0, [&results[4], &results[5]]);
+        sigma.give_pair(2, [&results[6], &results[7]]);
         sigma.give(4, &results[8]);
     }
 
@@ -1656,10 +1576,8 @@ impl Hopper {
             results[3][l] = lambda_3;
             results[4][l] = 0.0;
         }
-        lambda.give(0, &results[0]);
-        lambda.give(1, &results[1]);
-        lambda.give(2, &results[2]);
-        lambda.give(3, &results[3]);
+        lambda.give_pair(0, [&results[0], &results[1]]);
+        lambda.give_pair(2, [&results[2], &results[3]]);
         lambda.give(4, &results[4]);
     }
 
@@ -1699,10 +1617,8 @@ impl Hopper {
             results[2][l] = pd_0;
             results[3][l] = pd_1;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        pd.give(0, &results[2]);
-        pd.give(1, &results[3]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        pd.give_pair(0, [&results[2], &results[3]]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -1742,14 +1658,10 @@ impl Hopper {
             results[7][l] = sigma_3;
             results[8][l] = 0.0;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        freed.give(0, &results[2]);
-        freed.give(1, &results[3]);
-        sigma.give(0, &results[4]);
-        sigma.give(1, &results[5]);
-        sigma.give(2, &results[6]);
-        sigma.give(3, &results[7]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        freed.give_pair(0, [&results[2], &results[3]]);
+        sigma.give_pair(0, [&results[4], &results[5]]);
+        sigma.give_pair(2, [&results[6], &results[7]]);
         sigma.give(4, &results[8]);
     }
 
@@ -1789,10 +1701,8 @@ impl Hopper {
             results[3][l] = lambda_3;
             results[4][l] = 0.0;
         }
-        lambda.give(0, &results[0]);
-        lambda.give(1, &results[1]);
-        lambda.give(2, &results[2]);
-        lambda.give(3, &results[3]);
+        lambda.give_pair(0, [&results[0], &results[1]]);
+        lambda.give_pair(2, [&results[2], &results[3]]);
         lambda.give(4, &results[4]);
     }
 }

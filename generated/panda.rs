@@ -1148,22 +1148,14 @@ impl Panda {
             results[14][l] = pd_6;
             results[15][l] = pd_7;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
-        qd.give(6, &results[6]);
-        qd.give(7, &results[7]);
-        pd.give(0, &results[8]);
-        pd.give(1, &results[9]);
-        pd.give(2, &results[10]);
-        pd.give(3, &results[11]);
-        pd.give(4, &results[12]);
-        pd.give(5, &results[13]);
-        pd.give(6, &results[14]);
-        pd.give(7, &results[15]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
+        qd.give_pair(6, [&results[6], &results[7]]);
+        pd.give_pair(0, [&results[8], &results[9]]);
+        pd.give_pair(2, [&results[10], &results[11]]);
+        pd.give_pair(4, [&results[12], &results[13]]);
+        pd.give_pair(6, [&results[14], &results[15]]);
     }
 
     /// Velocities from momenta.
@@ -1862,14 +1854,10 @@ impl Panda {
             results[6][l] = panda_link7_v;
             results[7][l] = panda_leftfinger_v;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        v.give(2, &results[2]);
-        v.give(3, &results[3]);
-        v.give(4, &results[4]);
-        v.give(5, &results[5]);
-        v.give(6, &results[6]);
-        v.give(7, &results[7]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        v.give_pair(2, [&results[2], &results[3]]);
+        v.give_pair(4, [&results[4], &results[5]]);
+        v.give_pair(6, [&results[6], &results[7]]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -2337,14 +2325,10 @@ impl Panda {
             results[6][l] = -panda_link7_minus_p_rz;
             results[7][l] = p_7;
         }
-        p.give(0, &results[0]);
-        p.give(1, &results[1]);
-        p.give(2, &results[2]);
-        p.give(3, &results[3]);
-        p.give(4, &results[4]);
-        p.give(5, &results[5]);
-        p.give(6, &results[6]);
-        p.give(7, &results[7]);
+        p.give_pair(0, [&results[0], &results[1]]);
+        p.give_pair(2, [&results[2], &results[3]]);
+        p.give_pair(4, [&results[4], &results[5]]);
+        p.give_pair(6, [&results[6], &results[7]]);
     }
 
     /// Kinetic and potential energy, J.
@@ -3071,8 +3055,7 @@ impl Panda {
             results[0][l] = energy_0;
             results[1][l] = -minus_energy_1;
         }
-        energy.give(0, &results[0]);
-        energy.give(1, &results[1]);
+        energy.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
@@ -4454,14 +4437,10 @@ impl Panda {
             results[6][l] = a_6;
             results[7][l] = panda_leftfinger_a;
         }
-        a.give(0, &results[0]);
-        a.give(1, &results[1]);
-        a.give(2, &results[2]);
-        a.give(3, &results[3]);
-        a.give(4, &results[4]);
-        a.give(5, &results[5]);
-        a.give(6, &results[6]);
-        a.give(7, &results[7]);
+        a.give_pair(0, [&results[0], &results[1]]);
+        a.give_pair(2, [&results[2], &results[3]]);
+        a.give_pair(4, [&results[4], &results[5]]);
+        a.give_pair(6, [&results[6], &results[7]]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -4500,14 +4479,10 @@ impl Panda {
             results[6][l] = v_6;
             results[7][l] = v_7;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
-        qd.give(6, &results[6]);
-        qd.give(7, &results[7]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
+        qd.give_pair(6, [&results[6], &results[7]]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -450,19 +450,13 @@ impl Satellite {
             results[11][l] = pd_4;
             results[12][l] = pd_5;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
         qd.give(6, &results[6]);
-        pd.give(0, &results[7]);
-        pd.give(1, &results[8]);
-        pd.give(2, &results[9]);
-        pd.give(3, &results[10]);
-        pd.give(4, &results[11]);
-        pd.give(5, &results[12]);
+        pd.give_pair(0, [&results[7], &results[8]]);
+        pd.give_pair(2, [&results[9], &results[10]]);
+        pd.give_pair(4, [&results[11], &results[12]]);
     }
 
     /// Velocities from momenta.
@@ -687,12 +681,9 @@ impl Satellite {
             results[4][l] = -bus_minus_v;
             results[5][l] = -bus_minus_e_2;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        v.give(2, &results[2]);
-        v.give(3, &results[3]);
-        v.give(4, &results[4]);
-        v.give(5, &results[5]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        v.give_pair(2, [&results[2], &results[3]]);
+        v.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -885,12 +876,9 @@ impl Satellite {
             results[4][l] = bus_p_ry;
             results[5][l] = bus_p_rz;
         }
-        p.give(0, &results[0]);
-        p.give(1, &results[1]);
-        p.give(2, &results[2]);
-        p.give(3, &results[3]);
-        p.give(4, &results[4]);
-        p.give(5, &results[5]);
+        p.give_pair(0, [&results[0], &results[1]]);
+        p.give_pair(2, [&results[2], &results[3]]);
+        p.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// Kinetic and potential energy, J.
@@ -1161,8 +1149,7 @@ impl Satellite {
             results[0][l] = energy_0;
             results[1][l] = 0.0;
         }
-        energy.give(0, &results[0]);
-        energy.give(1, &results[1]);
+        energy.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
@@ -1608,12 +1595,9 @@ impl Satellite {
             results[4][l] = -bus_minus_a;
             results[5][l] = -bus_minus_e_2;
         }
-        a.give(0, &results[0]);
-        a.give(1, &results[1]);
-        a.give(2, &results[2]);
-        a.give(3, &results[3]);
-        a.give(4, &results[4]);
-        a.give(5, &results[5]);
+        a.give_pair(0, [&results[0], &results[1]]);
+        a.give_pair(2, [&results[2], &results[3]]);
+        a.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// Wrench `[force; moment]` that each joint transmits to its child, in the child's body frame, N and N m.
@@ -2337,24 +2321,15 @@ impl Satellite {
             results[16][l] = -panel_right_minus_f_rz;
             results[17][l] = reactions_2_5;
         }
-        reactions.give(0, &results[0]);
-        reactions.give(1, &results[1]);
-        reactions.give(2, &results[2]);
-        reactions.give(3, &results[3]);
-        reactions.give(4, &results[4]);
-        reactions.give(5, &results[5]);
-        reactions.give(6, &results[6]);
-        reactions.give(7, &results[7]);
-        reactions.give(8, &results[8]);
-        reactions.give(9, &results[9]);
-        reactions.give(10, &results[10]);
-        reactions.give(11, &results[11]);
-        reactions.give(12, &results[12]);
-        reactions.give(13, &results[13]);
-        reactions.give(14, &results[14]);
-        reactions.give(15, &results[15]);
-        reactions.give(16, &results[16]);
-        reactions.give(17, &results[17]);
+        reactions.give_pair(0, [&results[0], &results[1]]);
+        reactions.give_pair(2, [&results[2], &results[3]]);
+        reactions.give_pair(4, [&results[4], &results[5]]);
+        reactions.give_pair(6, [&results[6], &results[7]]);
+        reactions.give_pair(8, [&results[8], &results[9]]);
+        reactions.give_pair(10, [&results[10], &results[11]]);
+        reactions.give_pair(12, [&results[12], &results[13]]);
+        reactions.give_pair(14, [&results[14], &results[15]]);
+        reactions.give_pair(16, [&results[16], &results[17]]);
     }
 
     /// Mass matrix, by rows.
@@ -2483,42 +2458,24 @@ impl Satellite {
             results[34][l] = m_4_5;
             results[35][l] = -minus_m_5_5;
         }
-        m.give(0, &results[0]);
-        m.give(1, &results[1]);
-        m.give(2, &results[2]);
-        m.give(3, &results[3]);
-        m.give(4, &results[4]);
-        m.give(5, &results[5]);
-        m.give(6, &results[6]);
-        m.give(7, &results[7]);
-        m.give(8, &results[8]);
-        m.give(9, &results[9]);
-        m.give(10, &results[10]);
-        m.give(11, &results[11]);
-        m.give(12, &results[12]);
-        m.give(13, &results[13]);
-        m.give(14, &results[14]);
-        m.give(15, &results[15]);
-        m.give(16, &results[16]);
-        m.give(17, &results[17]);
-        m.give(18, &results[18]);
-        m.give(19, &results[19]);
-        m.give(20, &results[20]);
-        m.give(21, &results[21]);
-        m.give(22, &results[22]);
-        m.give(23, &results[23]);
-        m.give(24, &results[24]);
-        m.give(25, &results[25]);
-        m.give(26, &results[26]);
-        m.give(27, &results[27]);
-        m.give(28, &results[28]);
-        m.give(29, &results[29]);
-        m.give(30, &results[30]);
-        m.give(31, &results[31]);
-        m.give(32, &results[32]);
-        m.give(33, &results[33]);
-        m.give(34, &results[34]);
-        m.give(35, &results[35]);
+        m.give_pair(0, [&results[0], &results[1]]);
+        m.give_pair(2, [&results[2], &results[3]]);
+        m.give_pair(4, [&results[4], &results[5]]);
+        m.give_pair(6, [&results[6], &results[7]]);
+        m.give_pair(8, [&results[8], &results[9]]);
+        m.give_pair(10, [&results[10], &results[11]]);
+        m.give_pair(12, [&results[12], &results[13]]);
+        m.give_pair(14, [&results[14], &results[15]]);
+        m.give_pair(16, [&results[16], &results[17]]);
+        m.give_pair(18, [&results[18], &results[19]]);
+        m.give_pair(20, [&results[20], &results[21]]);
+        m.give_pair(22, [&results[22], &results[23]]);
+        m.give_pair(24, [&results[24], &results[25]]);
+        m.give_pair(26, [&results[26], &results[27]]);
+        m.give_pair(28, [&results[28], &results[29]]);
+        m.give_pair(30, [&results[30], &results[31]]);
+        m.give_pair(32, [&results[32], &results[33]]);
+        m.give_pair(34, [&results[34], &results[35]]);
     }
 
     /// Rotation, position and velocity of frames. The rotation takes components in the frame's axes to ground axes; the
@@ -2764,60 +2721,34 @@ impl Satellite {
             results[52][l] = panel_right_omega_rz;
             results[53][l] = panel_right_minus_hat_ry;
         }
-        rotation.give(0, &results[0]);
-        rotation.give(1, &results[1]);
-        rotation.give(2, &results[2]);
-        rotation.give(3, &results[3]);
-        rotation.give(4, &results[4]);
-        rotation.give(5, &results[5]);
-        rotation.give(6, &results[6]);
-        rotation.give(7, &results[7]);
-        rotation.give(8, &results[8]);
-        rotation.give(9, &results[9]);
-        rotation.give(10, &results[10]);
-        rotation.give(11, &results[11]);
-        rotation.give(12, &results[12]);
-        rotation.give(13, &results[13]);
-        rotation.give(14, &results[14]);
-        rotation.give(15, &results[15]);
-        rotation.give(16, &results[16]);
-        rotation.give(17, &results[17]);
-        rotation.give(18, &results[18]);
-        rotation.give(19, &results[19]);
-        rotation.give(20, &results[20]);
-        rotation.give(21, &results[21]);
-        rotation.give(22, &results[22]);
-        rotation.give(23, &results[23]);
-        rotation.give(24, &results[24]);
-        rotation.give(25, &results[25]);
+        rotation.give_pair(0, [&results[0], &results[1]]);
+        rotation.give_pair(2, [&results[2], &results[3]]);
+        rotation.give_pair(4, [&results[4], &results[5]]);
+        rotation.give_pair(6, [&results[6], &results[7]]);
+        rotation.give_pair(8, [&results[8], &results[9]]);
+        rotation.give_pair(10, [&results[10], &results[11]]);
+        rotation.give_pair(12, [&results[12], &results[13]]);
+        rotation.give_pair(14, [&results[14], &results[15]]);
+        rotation.give_pair(16, [&results[16], &results[17]]);
+        rotation.give_pair(18, [&results[18], &results[19]]);
+        rotation.give_pair(20, [&results[20], &results[21]]);
+        rotation.give_pair(22, [&results[22], &results[23]]);
+        rotation.give_pair(24, [&results[24], &results[25]]);
         rotation.give(26, &results[26]);
-        position.give(0, &results[27]);
-        position.give(1, &results[28]);
-        position.give(2, &results[29]);
-        position.give(3, &results[30]);
-        position.give(4, &results[31]);
-        position.give(5, &results[32]);
-        position.give(6, &results[33]);
-        position.give(7, &results[34]);
+        position.give_pair(0, [&results[27], &results[28]]);
+        position.give_pair(2, [&results[29], &results[30]]);
+        position.give_pair(4, [&results[31], &results[32]]);
+        position.give_pair(6, [&results[33], &results[34]]);
         position.give(8, &results[35]);
-        velocity.give(0, &results[36]);
-        velocity.give(1, &results[37]);
-        velocity.give(2, &results[38]);
-        velocity.give(3, &results[39]);
-        velocity.give(4, &results[40]);
-        velocity.give(5, &results[41]);
-        velocity.give(6, &results[42]);
-        velocity.give(7, &results[43]);
-        velocity.give(8, &results[44]);
-        velocity.give(9, &results[45]);
-        velocity.give(10, &results[46]);
-        velocity.give(11, &results[47]);
-        velocity.give(12, &results[48]);
-        velocity.give(13, &results[49]);
-        velocity.give(14, &results[50]);
-        velocity.give(15, &results[51]);
-        velocity.give(16, &results[52]);
-        velocity.give(17, &results[53]);
+        velocity.give_pair(0, [&results[36], &results[37]]);
+        velocity.give_pair(2, [&results[38], &results[39]]);
+        velocity.give_pair(4, [&results[40], &results[41]]);
+        velocity.give_pair(6, [&results[42], &results[43]]);
+        velocity.give_pair(8, [&results[44], &results[45]]);
+        velocity.give_pair(10, [&results[46], &results[47]]);
+        velocity.give_pair(12, [&results[48], &results[49]]);
+        velocity.give_pair(14, [&results[50], &results[51]]);
+        velocity.give_pair(16, [&results[52], &results[53]]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`.
@@ -3170,12 +3101,9 @@ impl Satellite {
             results[4][l] = tau_4;
             results[5][l] = tau_5;
         }
-        tau.give(0, &results[0]);
-        tau.give(1, &results[1]);
-        tau.give(2, &results[2]);
-        tau.give(3, &results[3]);
-        tau.give(4, &results[4]);
-        tau.give(5, &results[5]);
+        tau.give_pair(0, [&results[0], &results[1]]);
+        tau.give_pair(2, [&results[2], &results[3]]);
+        tau.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`.
@@ -3483,12 +3411,9 @@ impl Satellite {
             results[4][l] = h_4;
             results[5][l] = -minus_h_5;
         }
-        h.give(0, &results[0]);
-        h.give(1, &results[1]);
-        h.give(2, &results[2]);
-        h.give(3, &results[3]);
-        h.give(4, &results[4]);
-        h.give(5, &results[5]);
+        h.give_pair(0, [&results[0], &results[1]]);
+        h.give_pair(2, [&results[2], &results[3]]);
+        h.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// Jacobians `J` of frames.
@@ -3643,114 +3568,60 @@ impl Satellite {
             results[106][l] = 0.0;
             results[107][l] = panel_right_cos;
         }
-        jacobian.give(0, &results[0]);
-        jacobian.give(1, &results[1]);
-        jacobian.give(2, &results[2]);
-        jacobian.give(3, &results[3]);
-        jacobian.give(4, &results[4]);
-        jacobian.give(5, &results[5]);
-        jacobian.give(6, &results[6]);
-        jacobian.give(7, &results[7]);
-        jacobian.give(8, &results[8]);
-        jacobian.give(9, &results[9]);
-        jacobian.give(10, &results[10]);
-        jacobian.give(11, &results[11]);
-        jacobian.give(12, &results[12]);
-        jacobian.give(13, &results[13]);
-        jacobian.give(14, &results[14]);
-        jacobian.give(15, &results[15]);
-        jacobian.give(16, &results[16]);
-        jacobian.give(17, &results[17]);
-        jacobian.give(18, &results[18]);
-        jacobian.give(19, &results[19]);
-        jacobian.give(20, &results[20]);
-        jacobian.give(21, &results[21]);
-        jacobian.give(22, &results[22]);
-        jacobian.give(23, &results[23]);
-        jacobian.give(24, &results[24]);
-        jacobian.give(25, &results[25]);
-        jacobian.give(26, &results[26]);
-        jacobian.give(27, &results[27]);
-        jacobian.give(28, &results[28]);
-        jacobian.give(29, &results[29]);
-        jacobian.give(30, &results[30]);
-        jacobian.give(31, &results[31]);
-        jacobian.give(32, &results[32]);
-        jacobian.give(33, &results[33]);
-        jacobian.give(34, &results[34]);
-        jacobian.give(35, &results[35]);
-        jacobian.give(36, &results[36]);
-        jacobian.give(37, &results[37]);
-        jacobian.give(38, &results[38]);
-        jacobian.give(39, &results[39]);
-        jacobian.give(40, &results[40]);
-        jacobian.give(41, &results[41]);
-        jacobian.give(42, &results[42]);
-        jacobian.give(43, &results[43]);
-        jacobian.give(44, &results[44]);
-        jacobian.give(45, &results[45]);
-        jacobian.give(46, &results[46]);
-        jacobian.give(47, &results[47]);
-        jacobian.give(48, &results[48]);
-        jacobian.give(49, &results[49]);
-        jacobian.give(50, &results[50]);
-        jacobian.give(51, &results[51]);
-        jacobian.give(52, &results[52]);
-        jacobian.give(53, &results[53]);
-        jacobian.give(54, &results[54]);
-        jacobian.give(55, &results[55]);
-        jacobian.give(56, &results[56]);
-        jacobian.give(57, &results[57]);
-        jacobian.give(58, &results[58]);
-        jacobian.give(59, &results[59]);
-        jacobian.give(60, &results[60]);
-        jacobian.give(61, &results[61]);
-        jacobian.give(62, &results[62]);
-        jacobian.give(63, &results[63]);
-        jacobian.give(64, &results[64]);
-        jacobian.give(65, &results[65]);
-        jacobian.give(66, &results[66]);
-        jacobian.give(67, &results[67]);
-        jacobian.give(68, &results[68]);
-        jacobian.give(69, &results[69]);
-        jacobian.give(70, &results[70]);
-        jacobian.give(71, &results[71]);
-        jacobian.give(72, &results[72]);
-        jacobian.give(73, &results[73]);
-        jacobian.give(74, &results[74]);
-        jacobian.give(75, &results[75]);
-        jacobian.give(76, &results[76]);
-        jacobian.give(77, &results[77]);
-        jacobian.give(78, &results[78]);
-        jacobian.give(79, &results[79]);
-        jacobian.give(80, &results[80]);
-        jacobian.give(81, &results[81]);
-        jacobian.give(82, &results[82]);
-        jacobian.give(83, &results[83]);
-        jacobian.give(84, &results[84]);
-        jacobian.give(85, &results[85]);
-        jacobian.give(86, &results[86]);
-        jacobian.give(87, &results[87]);
-        jacobian.give(88, &results[88]);
-        jacobian.give(89, &results[89]);
-        jacobian.give(90, &results[90]);
-        jacobian.give(91, &results[91]);
-        jacobian.give(92, &results[92]);
-        jacobian.give(93, &results[93]);
-        jacobian.give(94, &results[94]);
-        jacobian.give(95, &results[95]);
-        jacobian.give(96, &results[96]);
-        jacobian.give(97, &results[97]);
-        jacobian.give(98, &results[98]);
-        jacobian.give(99, &results[99]);
-        jacobian.give(100, &results[100]);
-        jacobian.give(101, &results[101]);
-        jacobian.give(102, &results[102]);
-        jacobian.give(103, &results[103]);
-        jacobian.give(104, &results[104]);
-        jacobian.give(105, &results[105]);
-        jacobian.give(106, &results[106]);
-        jacobian.give(107, &results[107]);
+        jacobian.give_pair(0, [&results[0], &results[1]]);
+        jacobian.give_pair(2, [&results[2], &results[3]]);
+        jacobian.give_pair(4, [&results[4], &results[5]]);
+        jacobian.give_pair(6, [&results[6], &results[7]]);
+        jacobian.give_pair(8, [&results[8], &results[9]]);
+        jacobian.give_pair(10, [&results[10], &results[11]]);
+        jacobian.give_pair(12, [&results[12], &results[13]]);
+        jacobian.give_pair(14, [&results[14], &results[15]]);
+        jacobian.give_pair(16, [&results[16], &results[17]]);
+        jacobian.give_pair(18, [&results[18], &results[19]]);
+        jacobian.give_pair(20, [&results[20], &results[21]]);
+        jacobian.give_pair(22, [&results[22], &results[23]]);
+        jacobian.give_pair(24, [&results[24], &results[25]]);
+        jacobian.give_pair(26, [&results[26], &results[27]]);
+        jacobian.give_pair(28, [&results[28], &results[29]]);
+        jacobian.give_pair(30, [&results[30], &results[31]]);
+        jacobian.give_pair(32, [&results[32], &results[33]]);
+        jacobian.give_pair(34, [&results[34], &results[35]]);
+        jacobian.give_pair(36, [&results[36], &results[37]]);
+        jacobian.give_pair(38, [&results[38], &results[39]]);
+        jacobian.give_pair(40, [&results[40], &results[41]]);
+        jacobian.give_pair(42, [&results[42], &results[43]]);
+        jacobian.give_pair(44, [&results[44], &results[45]]);
+        jacobian.give_pair(46, [&results[46], &results[47]]);
+        jacobian.give_pair(48, [&results[48], &results[49]]);
+        jacobian.give_pair(50, [&results[50], &results[51]]);
+        jacobian.give_pair(52, [&results[52], &results[53]]);
+        jacobian.give_pair(54, [&results[54], &results[55]]);
+        jacobian.give_pair(56, [&results[56], &results[57]]);
+        jacobian.give_pair(58, [&results[58], &results[59]]);
+        jacobian.give_pair(60, [&results[60], &results[61]]);
+        jacobian.give_pair(62, [&results[62], &results[63]]);
+        jacobian.give_pair(64, [&results[64], &results[65]]);
+        jacobian.give_pair(66, [&results[66], &results[67]]);
+        jacobian.give_pair(68, [&results[68], &results[69]]);
+        jacobian.give_pair(70, [&results[70], &results[71]]);
+        jacobian.give_pair(72, [&results[72], &results[73]]);
+        jacobian.give_pair(74, [&results[74], &results[75]]);
+        jacobian.give_pair(76, [&results[76], &results[77]]);
+        jacobian.give_pair(78, [&results[78], &results[79]]);
+        jacobian.give_pair(80, [&results[80], &results[81]]);
+        jacobian.give_pair(82, [&results[82], &results[83]]);
+        jacobian.give_pair(84, [&results[84], &results[85]]);
+        jacobian.give_pair(86, [&results[86], &results[87]]);
+        jacobian.give_pair(88, [&results[88], &results[89]]);
+        jacobian.give_pair(90, [&results[90], &results[91]]);
+        jacobian.give_pair(92, [&results[92], &results[93]]);
+        jacobian.give_pair(94, [&results[94], &results[95]]);
+        jacobian.give_pair(96, [&results[96], &results[97]]);
+        jacobian.give_pair(98, [&results[98], &results[99]]);
+        jacobian.give_pair(100, [&results[100], &results[101]]);
+        jacobian.give_pair(102, [&results[102], &results[103]]);
+        jacobian.give_pair(104, [&results[104], &results[105]]);
+        jacobian.give_pair(106, [&results[106], &results[107]]);
     }
 
     /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
@@ -3912,24 +3783,15 @@ impl Satellite {
             results[16][l] = drive_a_1;
             results[17][l] = panel_right_minus_alpha_y;
         }
-        bias.give(0, &results[0]);
-        bias.give(1, &results[1]);
-        bias.give(2, &results[2]);
-        bias.give(3, &results[3]);
-        bias.give(4, &results[4]);
-        bias.give(5, &results[5]);
-        bias.give(6, &results[6]);
-        bias.give(7, &results[7]);
-        bias.give(8, &results[8]);
-        bias.give(9, &results[9]);
-        bias.give(10, &results[10]);
-        bias.give(11, &results[11]);
-        bias.give(12, &results[12]);
-        bias.give(13, &results[13]);
-        bias.give(14, &results[14]);
-        bias.give(15, &results[15]);
-        bias.give(16, &results[16]);
-        bias.give(17, &results[17]);
+        bias.give_pair(0, [&results[0], &results[1]]);
+        bias.give_pair(2, [&results[2], &results[3]]);
+        bias.give_pair(4, [&results[4], &results[5]]);
+        bias.give_pair(6, [&results[6], &results[7]]);
+        bias.give_pair(8, [&results[8], &results[9]]);
+        bias.give_pair(10, [&results[10], &results[11]]);
+        bias.give_pair(12, [&results[12], &results[13]]);
+        bias.give_pair(14, [&results[14], &results[15]]);
+        bias.give_pair(16, [&results[16], &results[17]]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -4036,12 +3898,9 @@ impl Satellite {
             results[5][l] = bus_t56;
             results[6][l] = -bus_t62;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
         qd.give(6, &results[6]);
     }
 

@@ -2554,43 +2554,25 @@ impl Solo12 {
             results[35][l] = pd_16;
             results[36][l] = pd_17;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
-        qd.give(6, &results[6]);
-        qd.give(7, &results[7]);
-        qd.give(8, &results[8]);
-        qd.give(9, &results[9]);
-        qd.give(10, &results[10]);
-        qd.give(11, &results[11]);
-        qd.give(12, &results[12]);
-        qd.give(13, &results[13]);
-        qd.give(14, &results[14]);
-        qd.give(15, &results[15]);
-        qd.give(16, &results[16]);
-        qd.give(17, &results[17]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
+        qd.give_pair(6, [&results[6], &results[7]]);
+        qd.give_pair(8, [&results[8], &results[9]]);
+        qd.give_pair(10, [&results[10], &results[11]]);
+        qd.give_pair(12, [&results[12], &results[13]]);
+        qd.give_pair(14, [&results[14], &results[15]]);
+        qd.give_pair(16, [&results[16], &results[17]]);
         qd.give(18, &results[18]);
-        pd.give(0, &results[19]);
-        pd.give(1, &results[20]);
-        pd.give(2, &results[21]);
-        pd.give(3, &results[22]);
-        pd.give(4, &results[23]);
-        pd.give(5, &results[24]);
-        pd.give(6, &results[25]);
-        pd.give(7, &results[26]);
-        pd.give(8, &results[27]);
-        pd.give(9, &results[28]);
-        pd.give(10, &results[29]);
-        pd.give(11, &results[30]);
-        pd.give(12, &results[31]);
-        pd.give(13, &results[32]);
-        pd.give(14, &results[33]);
-        pd.give(15, &results[34]);
-        pd.give(16, &results[35]);
-        pd.give(17, &results[36]);
+        pd.give_pair(0, [&results[19], &results[20]]);
+        pd.give_pair(2, [&results[21], &results[22]]);
+        pd.give_pair(4, [&results[23], &results[24]]);
+        pd.give_pair(6, [&results[25], &results[26]]);
+        pd.give_pair(8, [&results[27], &results[28]]);
+        pd.give_pair(10, [&results[29], &results[30]]);
+        pd.give_pair(12, [&results[31], &results[32]]);
+        pd.give_pair(14, [&results[33], &results[34]]);
+        pd.give_pair(16, [&results[35], &results[36]]);
     }
 
     /// Velocities from momenta.
@@ -4293,24 +4275,15 @@ impl Solo12 {
             results[16][l] = hr_upper_leg_v;
             results[17][l] = hr_lower_leg_v;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        v.give(2, &results[2]);
-        v.give(3, &results[3]);
-        v.give(4, &results[4]);
-        v.give(5, &results[5]);
-        v.give(6, &results[6]);
-        v.give(7, &results[7]);
-        v.give(8, &results[8]);
-        v.give(9, &results[9]);
-        v.give(10, &results[10]);
-        v.give(11, &results[11]);
-        v.give(12, &results[12]);
-        v.give(13, &results[13]);
-        v.give(14, &results[14]);
-        v.give(15, &results[15]);
-        v.give(16, &results[16]);
-        v.give(17, &results[17]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        v.give_pair(2, [&results[2], &results[3]]);
+        v.give_pair(4, [&results[4], &results[5]]);
+        v.give_pair(6, [&results[6], &results[7]]);
+        v.give_pair(8, [&results[8], &results[9]]);
+        v.give_pair(10, [&results[10], &results[11]]);
+        v.give_pair(12, [&results[12], &results[13]]);
+        v.give_pair(14, [&results[14], &results[15]]);
+        v.give_pair(16, [&results[16], &results[17]]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -5129,24 +5102,15 @@ impl Solo12 {
             results[16][l] = hr_upper_leg_p_rz;
             results[17][l] = hr_lower_leg_p_rz;
         }
-        p.give(0, &results[0]);
-        p.give(1, &results[1]);
-        p.give(2, &results[2]);
-        p.give(3, &results[3]);
-        p.give(4, &results[4]);
-        p.give(5, &results[5]);
-        p.give(6, &results[6]);
-        p.give(7, &results[7]);
-        p.give(8, &results[8]);
-        p.give(9, &results[9]);
-        p.give(10, &results[10]);
-        p.give(11, &results[11]);
-        p.give(12, &results[12]);
-        p.give(13, &results[13]);
-        p.give(14, &results[14]);
-        p.give(15, &results[15]);
-        p.give(16, &results[16]);
-        p.give(17, &results[17]);
+        p.give_pair(0, [&results[0], &results[1]]);
+        p.give_pair(2, [&results[2], &results[3]]);
+        p.give_pair(4, [&results[4], &results[5]]);
+        p.give_pair(6, [&results[6], &results[7]]);
+        p.give_pair(8, [&results[8], &results[9]]);
+        p.give_pair(10, [&results[10], &results[11]]);
+        p.give_pair(12, [&results[12], &results[13]]);
+        p.give_pair(14, [&results[14], &results[15]]);
+        p.give_pair(16, [&results[16], &results[17]]);
     }
 
     /// Kinetic and potential energy, J.
@@ -6943,8 +6907,7 @@ impl Solo12 {
             results[0][l] = -minus_energy_0;
             results[1][l] = energy_1;
         }
-        energy.give(0, &results[0]);
-        energy.give(1, &results[1]);
+        energy.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
@@ -9650,24 +9613,15 @@ impl Solo12 {
             results[16][l] = a_16;
             results[17][l] = hr_lower_leg_a;
         }
-        a.give(0, &results[0]);
-        a.give(1, &results[1]);
-        a.give(2, &results[2]);
-        a.give(3, &results[3]);
-        a.give(4, &results[4]);
-        a.give(5, &results[5]);
-        a.give(6, &results[6]);
-        a.give(7, &results[7]);
-        a.give(8, &results[8]);
-        a.give(9, &results[9]);
-        a.give(10, &results[10]);
-        a.give(11, &results[11]);
-        a.give(12, &results[12]);
-        a.give(13, &results[13]);
-        a.give(14, &results[14]);
-        a.give(15, &results[15]);
-        a.give(16, &results[16]);
-        a.give(17, &results[17]);
+        a.give_pair(0, [&results[0], &results[1]]);
+        a.give_pair(2, [&results[2], &results[3]]);
+        a.give_pair(4, [&results[4], &results[5]]);
+        a.give_pair(6, [&results[6], &results[7]]);
+        a.give_pair(8, [&results[8], &results[9]]);
+        a.give_pair(10, [&results[10], &results[11]]);
+        a.give_pair(12, [&results[12], &results[13]]);
+        a.give_pair(14, [&results[14], &results[15]]);
+        a.give_pair(16, [&results[16], &results[17]]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -9810,24 +9764,15 @@ impl Solo12 {
             results[17][l] = v_16;
             results[18][l] = v_17;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
-        qd.give(6, &results[6]);
-        qd.give(7, &results[7]);
-        qd.give(8, &results[8]);
-        qd.give(9, &results[9]);
-        qd.give(10, &results[10]);
-        qd.give(11, &results[11]);
-        qd.give(12, &results[12]);
-        qd.give(13, &results[13]);
-        qd.give(14, &results[14]);
-        qd.give(15, &results[15]);
-        qd.give(16, &results[16]);
-        qd.give(17, &results[17]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
+        qd.give_pair(6, [&results[6], &results[7]]);
+        qd.give_pair(8, [&results[8], &results[9]]);
+        qd.give_pair(10, [&results[10], &results[11]]);
+        qd.give_pair(12, [&results[12], &results[13]]);
+        qd.give_pair(14, [&results[14], &results[15]]);
+        qd.give_pair(16, [&results[16], &results[17]]);
         qd.give(18, &results[18]);
     }
 

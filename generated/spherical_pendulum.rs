@@ -263,15 +263,11 @@ impl SphericalPendulum {
             results[7][l] = pd_2;
             results[8][l] = pd_3;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
         qd.give(4, &results[4]);
-        pd.give(0, &results[5]);
-        pd.give(1, &results[6]);
-        pd.give(2, &results[7]);
-        pd.give(3, &results[8]);
+        pd.give_pair(0, [&results[5], &results[6]]);
+        pd.give_pair(2, [&results[7], &results[8]]);
     }
 
     /// Velocities from momenta.
@@ -361,10 +357,8 @@ impl SphericalPendulum {
             results[2][l] = -bob_minus_e_2;
             results[3][l] = tail_v;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        v.give(2, &results[2]);
-        v.give(3, &results[3]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        v.give_pair(2, [&results[2], &results[3]]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -443,10 +437,8 @@ impl SphericalPendulum {
             results[2][l] = bob_p_rz;
             results[3][l] = tail_p_rz;
         }
-        p.give(0, &results[0]);
-        p.give(1, &results[1]);
-        p.give(2, &results[2]);
-        p.give(3, &results[3]);
+        p.give_pair(0, [&results[0], &results[1]]);
+        p.give_pair(2, [&results[2], &results[3]]);
     }
 
     /// Kinetic and potential energy, J.
@@ -573,8 +565,7 @@ impl SphericalPendulum {
             results[0][l] = energy_0;
             results[1][l] = energy_1;
         }
-        energy.give(0, &results[0]);
-        energy.give(1, &results[1]);
+        energy.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
@@ -779,10 +770,8 @@ impl SphericalPendulum {
             results[2][l] = -bob_minus_e_2;
             results[3][l] = tail_a;
         }
-        a.give(0, &results[0]);
-        a.give(1, &results[1]);
-        a.give(2, &results[2]);
-        a.give(3, &results[3]);
+        a.give_pair(0, [&results[0], &results[1]]);
+        a.give_pair(2, [&results[2], &results[3]]);
     }
 
     /// Wrench `[force; moment]` that each joint transmits to its child, in the child's body frame, N and N m.
@@ -1104,18 +1093,12 @@ impl SphericalPendulum {
             results[10][l] = -tail_minus_f_rz_2;
             results[11][l] = reactions_1_5;
         }
-        reactions.give(0, &results[0]);
-        reactions.give(1, &results[1]);
-        reactions.give(2, &results[2]);
-        reactions.give(3, &results[3]);
-        reactions.give(4, &results[4]);
-        reactions.give(5, &results[5]);
-        reactions.give(6, &results[6]);
-        reactions.give(7, &results[7]);
-        reactions.give(8, &results[8]);
-        reactions.give(9, &results[9]);
-        reactions.give(10, &results[10]);
-        reactions.give(11, &results[11]);
+        reactions.give_pair(0, [&results[0], &results[1]]);
+        reactions.give_pair(2, [&results[2], &results[3]]);
+        reactions.give_pair(4, [&results[4], &results[5]]);
+        reactions.give_pair(6, [&results[6], &results[7]]);
+        reactions.give_pair(8, [&results[8], &results[9]]);
+        reactions.give_pair(10, [&results[10], &results[11]]);
     }
 
     /// Mass matrix, by rows.
@@ -1181,22 +1164,14 @@ impl SphericalPendulum {
             results[14][l] = 0.0;
             results[15][l] = 0.027700000000000002;
         }
-        m.give(0, &results[0]);
-        m.give(1, &results[1]);
-        m.give(2, &results[2]);
-        m.give(3, &results[3]);
-        m.give(4, &results[4]);
-        m.give(5, &results[5]);
-        m.give(6, &results[6]);
-        m.give(7, &results[7]);
-        m.give(8, &results[8]);
-        m.give(9, &results[9]);
-        m.give(10, &results[10]);
-        m.give(11, &results[11]);
-        m.give(12, &results[12]);
-        m.give(13, &results[13]);
-        m.give(14, &results[14]);
-        m.give(15, &results[15]);
+        m.give_pair(0, [&results[0], &results[1]]);
+        m.give_pair(2, [&results[2], &results[3]]);
+        m.give_pair(4, [&results[4], &results[5]]);
+        m.give_pair(6, [&results[6], &results[7]]);
+        m.give_pair(8, [&results[8], &results[9]]);
+        m.give_pair(10, [&results[10], &results[11]]);
+        m.give_pair(12, [&results[12], &results[13]]);
+        m.give_pair(14, [&results[14], &results[15]]);
     }
 
     /// Rotation, position and velocity of frames. The rotation takes components in the frame's axes to ground axes; the
@@ -1366,42 +1341,24 @@ impl SphericalPendulum {
             results[34][l] = tail_omega_rz;
             results[35][l] = velocity_1_5;
         }
-        rotation.give(0, &results[0]);
-        rotation.give(1, &results[1]);
-        rotation.give(2, &results[2]);
-        rotation.give(3, &results[3]);
-        rotation.give(4, &results[4]);
-        rotation.give(5, &results[5]);
-        rotation.give(6, &results[6]);
-        rotation.give(7, &results[7]);
-        rotation.give(8, &results[8]);
-        rotation.give(9, &results[9]);
-        rotation.give(10, &results[10]);
-        rotation.give(11, &results[11]);
-        rotation.give(12, &results[12]);
-        rotation.give(13, &results[13]);
-        rotation.give(14, &results[14]);
-        rotation.give(15, &results[15]);
-        rotation.give(16, &results[16]);
-        rotation.give(17, &results[17]);
-        position.give(0, &results[18]);
-        position.give(1, &results[19]);
-        position.give(2, &results[20]);
-        position.give(3, &results[21]);
-        position.give(4, &results[22]);
-        position.give(5, &results[23]);
-        velocity.give(0, &results[24]);
-        velocity.give(1, &results[25]);
-        velocity.give(2, &results[26]);
-        velocity.give(3, &results[27]);
-        velocity.give(4, &results[28]);
-        velocity.give(5, &results[29]);
-        velocity.give(6, &results[30]);
-        velocity.give(7, &results[31]);
-        velocity.give(8, &results[32]);
-        velocity.give(9, &results[33]);
-        velocity.give(10, &results[34]);
-        velocity.give(11, &results[35]);
+        rotation.give_pair(0, [&results[0], &results[1]]);
+        rotation.give_pair(2, [&results[2], &results[3]]);
+        rotation.give_pair(4, [&results[4], &results[5]]);
+        rotation.give_pair(6, [&results[6], &results[7]]);
+        rotation.give_pair(8, [&results[8], &results[9]]);
+        rotation.give_pair(10, [&results[10], &results[11]]);
+        rotation.give_pair(12, [&results[12], &results[13]]);
+        rotation.give_pair(14, [&results[14], &results[15]]);
+        rotation.give_pair(16, [&results[16], &results[17]]);
+        position.give_pair(0, [&results[18], &results[19]]);
+        position.give_pair(2, [&results[20], &results[21]]);
+        position.give_pair(4, [&results[22], &results[23]]);
+        velocity.give_pair(0, [&results[24], &results[25]]);
+        velocity.give_pair(2, [&results[26], &results[27]]);
+        velocity.give_pair(4, [&results[28], &results[29]]);
+        velocity.give_pair(6, [&results[30], &results[31]]);
+        velocity.give_pair(8, [&results[32], &results[33]]);
+        velocity.give_pair(10, [&results[34], &results[35]]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`.
@@ -1573,10 +1530,8 @@ impl SphericalPendulum {
             results[2][l] = tau_2;
             results[3][l] = tail_f_rz;
         }
-        tau.give(0, &results[0]);
-        tau.give(1, &results[1]);
-        tau.give(2, &results[2]);
-        tau.give(3, &results[3]);
+        tau.give_pair(0, [&results[0], &results[1]]);
+        tau.give_pair(2, [&results[2], &results[3]]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`.
@@ -1720,10 +1675,8 @@ impl SphericalPendulum {
             results[2][l] = -minus_h_2;
             results[3][l] = -tail_minus_f_rz;
         }
-        h.give(0, &results[0]);
-        h.give(1, &results[1]);
-        h.give(2, &results[2]);
-        h.give(3, &results[3]);
+        h.give_pair(0, [&results[0], &results[1]]);
+        h.give_pair(2, [&results[2], &results[3]]);
     }
 
     /// Jacobians `J` of frames.
@@ -1807,54 +1760,30 @@ impl SphericalPendulum {
             results[46][l] = jacobian_9_0;
             results[47][l] = 0.0;
         }
-        jacobian.give(0, &results[0]);
-        jacobian.give(1, &results[1]);
-        jacobian.give(2, &results[2]);
-        jacobian.give(3, &results[3]);
-        jacobian.give(4, &results[4]);
-        jacobian.give(5, &results[5]);
-        jacobian.give(6, &results[6]);
-        jacobian.give(7, &results[7]);
-        jacobian.give(8, &results[8]);
-        jacobian.give(9, &results[9]);
-        jacobian.give(10, &results[10]);
-        jacobian.give(11, &results[11]);
-        jacobian.give(12, &results[12]);
-        jacobian.give(13, &results[13]);
-        jacobian.give(14, &results[14]);
-        jacobian.give(15, &results[15]);
-        jacobian.give(16, &results[16]);
-        jacobian.give(17, &results[17]);
-        jacobian.give(18, &results[18]);
-        jacobian.give(19, &results[19]);
-        jacobian.give(20, &results[20]);
-        jacobian.give(21, &results[21]);
-        jacobian.give(22, &results[22]);
-        jacobian.give(23, &results[23]);
-        jacobian.give(24, &results[24]);
-        jacobian.give(25, &results[25]);
-        jacobian.give(26, &results[26]);
-        jacobian.give(27, &results[27]);
-        jacobian.give(28, &results[28]);
-        jacobian.give(29, &results[29]);
-        jacobian.give(30, &results[30]);
-        jacobian.give(31, &results[31]);
-        jacobian.give(32, &results[32]);
-        jacobian.give(33, &results[33]);
-        jacobian.give(34, &results[34]);
-        jacobian.give(35, &results[35]);
-        jacobian.give(36, &results[36]);
-        jacobian.give(37, &results[37]);
-        jacobian.give(38, &results[38]);
-        jacobian.give(39, &results[39]);
-        jacobian.give(40, &results[40]);
-        jacobian.give(41, &results[41]);
-        jacobian.give(42, &results[42]);
-        jacobian.give(43, &results[43]);
-        jacobian.give(44, &results[44]);
-        jacobian.give(45, &results[45]);
-        jacobian.give(46, &results[46]);
-        jacobian.give(47, &results[47]);
+        jacobian.give_pair(0, [&results[0], &results[1]]);
+        jacobian.give_pair(2, [&results[2], &results[3]]);
+        jacobian.give_pair(4, [&results[4], &results[5]]);
+        jacobian.give_pair(6, [&results[6], &results[7]]);
+        jacobian.give_pair(8, [&results[8], &results[9]]);
+        jacobian.give_pair(10, [&results[10], &results[11]]);
+        jacobian.give_pair(12, [&results[12], &results[13]]);
+        jacobian.give_pair(14, [&results[14], &results[15]]);
+        jacobian.give_pair(16, [&results[16], &results[17]]);
+        jacobian.give_pair(18, [&results[18], &results[19]]);
+        jacobian.give_pair(20, [&results[20], &results[21]]);
+        jacobian.give_pair(22, [&results[22], &results[23]]);
+        jacobian.give_pair(24, [&results[24], &results[25]]);
+        jacobian.give_pair(26, [&results[26], &results[27]]);
+        jacobian.give_pair(28, [&results[28], &results[29]]);
+        jacobian.give_pair(30, [&results[30], &results[31]]);
+        jacobian.give_pair(32, [&results[32], &results[33]]);
+        jacobian.give_pair(34, [&results[34], &results[35]]);
+        jacobian.give_pair(36, [&results[36], &results[37]]);
+        jacobian.give_pair(38, [&results[38], &results[39]]);
+        jacobian.give_pair(40, [&results[40], &results[41]]);
+        jacobian.give_pair(42, [&results[42], &results[43]]);
+        jacobian.give_pair(44, [&results[44], &results[45]]);
+        jacobian.give_pair(46, [&results[46], &results[47]]);
     }
 
     /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
@@ -1938,18 +1867,12 @@ impl SphericalPendulum {
             results[10][l] = 0.0;
             results[11][l] = bias_1_5;
         }
-        bias.give(0, &results[0]);
-        bias.give(1, &results[1]);
-        bias.give(2, &results[2]);
-        bias.give(3, &results[3]);
-        bias.give(4, &results[4]);
-        bias.give(5, &results[5]);
-        bias.give(6, &results[6]);
-        bias.give(7, &results[7]);
-        bias.give(8, &results[8]);
-        bias.give(9, &results[9]);
-        bias.give(10, &results[10]);
-        bias.give(11, &results[11]);
+        bias.give_pair(0, [&results[0], &results[1]]);
+        bias.give_pair(2, [&results[2], &results[3]]);
+        bias.give_pair(4, [&results[4], &results[5]]);
+        bias.give_pair(6, [&results[6], &results[7]]);
+        bias.give_pair(8, [&results[8], &results[9]]);
+        bias.give_pair(10, [&results[10], &results[11]]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -2011,10 +1934,8 @@ impl SphericalPendulum {
             results[3][l] = -bob_t23;
             results[4][l] = v_3;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
         qd.give(4, &results[4]);
     }
 

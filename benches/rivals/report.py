@@ -72,6 +72,7 @@ def table(robots, about, late):
     text += lines(header, [
         [f"{NAMES[r.name]} ({r.nv})", ns(r, r.aba), *(ns(r, k) for k in keys)]
         + [ratio(r, "ours" + k, other) for other in (r.rival, r.aba) for k in ("_accelerations", "_rates")] for r in robots])
+    text += dependent(robots)
     text += ["", "## Eight states a call", "",
              "ns for each state. The rivals' C with eight doubles to a number and the C library's vector sine and cosine; our lanes; our batches of 256 states.", ""]
     header = ["robot (nv)", "CasADi", "CppADCodeGen", "ours, q̈", "ours, (q̇, ṗ)", "ours, batch of (q̇, ṗ)", "q̈ / rival", "(q̇, ṗ) / rival"]
@@ -87,6 +88,29 @@ def table(robots, about, late):
         rows.append([NAMES[r.name], *(str(r.rows[k]["operations"]) if k in r.rows else "–" for k in keys), f"{error:.0e}"])
     text += lines(["robot", "CasADi, q̈", "CppADCodeGen, q̈", "ours, q̈", "ours, (q̇, ṗ)", "difference"], rows)
     return "\n".join(text) + "\n"
+
+
+def dependent(robots):
+    """The same, where every evaluation waits for the one before it; and how far the rounds lie apart."""
+    keys = ["casadi", "cppadcg", "ours_accelerations", "ours_rates"]
+    robots = [r for r in robots if r.rows["ours_rates"].get("ns_dependent")]
+    if not robots:
+        return []
+    ns = lambda r, key: r.rows[key]["ns_dependent"] if key in r.rows else None
+    text = ["", "## One state a call, each moved by the results of the one before", "",
+            "ns, medians. An integrator calls the functions like this. *Spread*: half of the rounds lie within so many percent of the "
+            "median, the worst of all contestants, here / in the table above.", ""]
+    header = ["robot (nv)", "CasADi", "CppADCodeGen", "ours, q̈", "ours, (q̇, ṗ)", "q̈ / rival", "(q̇, ṗ) / rival", "spread"]
+    rows = []
+    for r in robots:
+        rival = min((ns(r, k) for k in keys[:2] if k in r.rows), default=None)
+        away = lambda row, name, median: max(abs(x / row[median] - 1) for x in row[name]) * 100
+        ours = [r.rows[k] for k in keys if k in r.rows]
+        spread = [max(away(row, *names) for row in ours) for names in
+                  (("ns_dependent_quartiles", "ns_dependent"), ("ns_quartiles", "ns_median"))]
+        rows.append([f"{NAMES[r.name]} ({r.nv})", *(number(ns(r, k)) if ns(r, k) else "–" for k in keys),
+                     *(f"{ns(r, k) / rival:.2f}" if rival else "–" for k in keys[2:]), " / ".join(f"{x:.1f}" for x in spread)])
+    return text + lines(header, rows)
 
 
 GREY, BLUE, ORANGE, RED = "#9aa3ad", "#5b8db8", "#e0a03c", "#c8502d"

@@ -446,18 +446,12 @@ impl Ur5 {
             results[10][l] = pd_4;
             results[11][l] = pd_5;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
-        pd.give(0, &results[6]);
-        pd.give(1, &results[7]);
-        pd.give(2, &results[8]);
-        pd.give(3, &results[9]);
-        pd.give(4, &results[10]);
-        pd.give(5, &results[11]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
+        pd.give_pair(0, [&results[6], &results[7]]);
+        pd.give_pair(2, [&results[8], &results[9]]);
+        pd.give_pair(4, [&results[10], &results[11]]);
     }
 
     /// Velocities from momenta.
@@ -710,12 +704,9 @@ impl Ur5 {
             results[4][l] = wrist_2_link_v;
             results[5][l] = wrist_3_link_v;
         }
-        v.give(0, &results[0]);
-        v.give(1, &results[1]);
-        v.give(2, &results[2]);
-        v.give(3, &results[3]);
-        v.give(4, &results[4]);
-        v.give(5, &results[5]);
+        v.give_pair(0, [&results[0], &results[1]]);
+        v.give_pair(2, [&results[2], &results[3]]);
+        v.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -908,12 +899,9 @@ impl Ur5 {
             results[4][l] = wrist_2_link_p_rz;
             results[5][l] = wrist_3_link_p_rz;
         }
-        p.give(0, &results[0]);
-        p.give(1, &results[1]);
-        p.give(2, &results[2]);
-        p.give(3, &results[3]);
-        p.give(4, &results[4]);
-        p.give(5, &results[5]);
+        p.give_pair(0, [&results[0], &results[1]]);
+        p.give_pair(2, [&results[2], &results[3]]);
+        p.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// Kinetic and potential energy, J.
@@ -1184,8 +1172,7 @@ impl Ur5 {
             results[0][l] = energy_0;
             results[1][l] = -minus_energy_1;
         }
-        energy.give(0, &results[0]);
-        energy.give(1, &results[1]);
+        energy.give_pair(0, [&results[0], &results[1]]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
@@ -1639,12 +1626,9 @@ impl Ur5 {
             results[4][l] = a_4;
             results[5][l] = a_5;
         }
-        a.give(0, &results[0]);
-        a.give(1, &results[1]);
-        a.give(2, &results[2]);
-        a.give(3, &results[3]);
-        a.give(4, &results[4]);
-        a.give(5, &results[5]);
+        a.give_pair(0, [&results[0], &results[1]]);
+        a.give_pair(2, [&results[2], &results[3]]);
+        a.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// Mass matrix, by rows.
@@ -1822,42 +1806,24 @@ impl Ur5 {
             results[34][l] = 0.0;
             results[35][l] = 0.0171364731454;
         }
-        m.give(0, &results[0]);
-        m.give(1, &results[1]);
-        m.give(2, &results[2]);
-        m.give(3, &results[3]);
-        m.give(4, &results[4]);
-        m.give(5, &results[5]);
-        m.give(6, &results[6]);
-        m.give(7, &results[7]);
-        m.give(8, &results[8]);
-        m.give(9, &results[9]);
-        m.give(10, &results[10]);
-        m.give(11, &results[11]);
-        m.give(12, &results[12]);
-        m.give(13, &results[13]);
-        m.give(14, &results[14]);
-        m.give(15, &results[15]);
-        m.give(16, &results[16]);
-        m.give(17, &results[17]);
-        m.give(18, &results[18]);
-        m.give(19, &results[19]);
-        m.give(20, &results[20]);
-        m.give(21, &results[21]);
-        m.give(22, &results[22]);
-        m.give(23, &results[23]);
-        m.give(24, &results[24]);
-        m.give(25, &results[25]);
-        m.give(26, &results[26]);
-        m.give(27, &results[27]);
-        m.give(28, &results[28]);
-        m.give(29, &results[29]);
-        m.give(30, &results[30]);
-        m.give(31, &results[31]);
-        m.give(32, &results[32]);
-        m.give(33, &results[33]);
-        m.give(34, &results[34]);
-        m.give(35, &results[35]);
+        m.give_pair(0, [&results[0], &results[1]]);
+        m.give_pair(2, [&results[2], &results[3]]);
+        m.give_pair(4, [&results[4], &results[5]]);
+        m.give_pair(6, [&results[6], &results[7]]);
+        m.give_pair(8, [&results[8], &results[9]]);
+        m.give_pair(10, [&results[10], &results[11]]);
+        m.give_pair(12, [&results[12], &results[13]]);
+        m.give_pair(14, [&results[14], &results[15]]);
+        m.give_pair(16, [&results[16], &results[17]]);
+        m.give_pair(18, [&results[18], &results[19]]);
+        m.give_pair(20, [&results[20], &results[21]]);
+        m.give_pair(22, [&results[22], &results[23]]);
+        m.give_pair(24, [&results[24], &results[25]]);
+        m.give_pair(26, [&results[26], &results[27]]);
+        m.give_pair(28, [&results[28], &results[29]]);
+        m.give_pair(30, [&results[30], &results[31]]);
+        m.give_pair(32, [&results[32], &results[33]]);
+        m.give_pair(34, [&results[34], &results[35]]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`.
@@ -2197,12 +2163,9 @@ impl Ur5 {
             results[4][l] = tau_4;
             results[5][l] = wrist_3_link_f_rz;
         }
-        tau.give(0, &results[0]);
-        tau.give(1, &results[1]);
-        tau.give(2, &results[2]);
-        tau.give(3, &results[3]);
-        tau.give(4, &results[4]);
-        tau.give(5, &results[5]);
+        tau.give_pair(0, [&results[0], &results[1]]);
+        tau.give_pair(2, [&results[2], &results[3]]);
+        tau.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`.
@@ -2473,12 +2436,9 @@ impl Ur5 {
             results[4][l] = h_4;
             results[5][l] = -wrist_3_link_minus_f_rz;
         }
-        h.give(0, &results[0]);
-        h.give(1, &results[1]);
-        h.give(2, &results[2]);
-        h.give(3, &results[3]);
-        h.give(4, &results[4]);
-        h.give(5, &results[5]);
+        h.give_pair(0, [&results[0], &results[1]]);
+        h.give_pair(2, [&results[2], &results[3]]);
+        h.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -2511,12 +2471,9 @@ impl Ur5 {
             results[4][l] = v_4;
             results[5][l] = v_5;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

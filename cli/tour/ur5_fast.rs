@@ -460,18 +460,12 @@ impl Ur5Fast {
             results[10][l] = pd_4;
             results[11][l] = pd_5;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
-        pd.give(0, &results[6]);
-        pd.give(1, &results[7]);
-        pd.give(2, &results[8]);
-        pd.give(3, &results[9]);
-        pd.give(4, &results[10]);
-        pd.give(5, &results[11]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
+        pd.give_pair(0, [&results[6], &results[7]]);
+        pd.give_pair(2, [&results[8], &results[9]]);
+        pd.give_pair(4, [&results[10], &results[11]]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -504,12 +498,9 @@ impl Ur5Fast {
             results[4][l] = v_4;
             results[5][l] = v_5;
         }
-        qd.give(0, &results[0]);
-        qd.give(1, &results[1]);
-        qd.give(2, &results[2]);
-        qd.give(3, &results[3]);
-        qd.give(4, &results[4]);
-        qd.give(5, &results[5]);
+        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(2, [&results[2], &results[3]]);
+        qd.give_pair(4, [&results[4], &results[5]]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -92,16 +92,42 @@ pub trait Write<T> {
             self.set(k, l, x[l]);
         }
     }
+    /// Sets numbers `k` and `k + 1` of all lanes, those of one state at once where the processor can: who reads them
+    /// next reads several at once, and has to wait for the memory if they were written one by one.
+    #[inline(always)]
+    fn give_pair<const L: usize>(&mut self, k: usize, x: [&[T; L]; 2])
+    where
+        T: Copy,
+    {
+        self.give(k, x[0]);
+        self.give(k + 1, x[1]);
+    }
+}
+
+/// Writes two numbers at once.
+#[inline(always)]
+#[allow(unsafe_code)]
+fn store_pair(to: &mut [f64; 2], x: [f64; 2]) {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: `to` are two doubles, which need not be aligned; every x86-64 has SSE2.
+    unsafe {
+        use core::arch::x86_64::{_mm_set_pd, _mm_storeu_pd};
+        _mm_storeu_pd(to.as_mut_ptr(), _mm_set_pd(x[1], x[0]));
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        *to = x;
+    }
 }
 
 macro_rules! places {
-    ($float:ident) => {
+    ($float:tt) => {
         places!(@one $float, [const N: usize], [$float; N]);
         places!(@one $float, [], [$float]);
         places!(@lanes $float, [const L: usize, const N: usize], [[$float; L]; N]);
         places!(@lanes $float, [const L: usize], [[$float; L]]);
     };
-    (@one $float:ident, [$($parameters:tt)*], $array:ty) => {
+    (@one $float:tt, [$($parameters:tt)*], $array:ty) => {
         impl<$($parameters)*> Read<$float> for $array {
             #[inline(always)]
             fn get(&self, k: usize, _: usize) -> $float {
@@ -113,9 +139,21 @@ macro_rules! places {
             fn set(&mut self, k: usize, _: usize, x: $float) {
                 self[k] = x;
             }
+            places!(@pair $float);
         }
     };
-    (@lanes $float:ident, [$($parameters:tt)*], $array:ty) => {
+    (@pair f64) => {
+        #[inline(always)]
+        fn give_pair<const L: usize>(&mut self, k: usize, [a, b]: [&[f64; L]; 2]) {
+            if let (1, Some(to)) = (L, self.get_mut(k..).and_then(|rest| rest.first_chunk_mut())) {
+                return store_pair(to, [a[0], b[0]]);
+            }
+            self.give(k, a);
+            self.give(k + 1, b);
+        }
+    };
+    (@pair f32) => {};
+    (@lanes $float:tt, [$($parameters:tt)*], $array:ty) => {
         impl<$($parameters)*> Read<$float> for $array {
             #[inline(always)]
             fn get(&self, k: usize, l: usize) -> $float {

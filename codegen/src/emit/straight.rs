@@ -180,8 +180,20 @@ impl<'a> Straight<'a> {
             let _ = writeln!(out, "            results[{k}][l] = {value};");
         }
         let _ = writeln!(out, "        }}");
-        for (result, (name, k)) in self.head.places().into_iter().enumerate() {
-            let _ = writeln!(out, "        {name}.give({k}, &results[{result}]);");
+        let places = self.head.places();
+        let mut at = 0;
+        while let Some((name, k)) = places.get(at) {
+            // Two at once where they stand beside one another.
+            at += match places.get(at + 1) {
+                Some((next, _)) if next == name => {
+                    let _ = writeln!(out, "        {name}.give_pair({k}, [&results[{at}], &results[{}]]);", at + 1);
+                    2
+                }
+                _ => {
+                    let _ = writeln!(out, "        {name}.give({k}, &results[{at}]);");
+                    1
+                }
+            };
         }
     }
 }
