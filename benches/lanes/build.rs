@@ -82,12 +82,23 @@ fn chain(links: usize, planar: bool) -> String {
     let mut text = String::from("name = \"chain\"\ngravity = [0, 0, -9.81]\n");
     for k in 1..=links {
         let parent = if k == 1 { "ground".to_string() } else { format!("link{}", k - 1) };
-        let mut three = |low, high| format!("[{:.3}, {:.3}, {:.3}]", random(low, high), random(low, high), random(low, high));
+        let mut three =
+            |low, high| format!("[{:.3}, {:.3}, {:.3}]", random(low, high), random(low, high), random(low, high));
         let (com, inertia, xyz, rpy, axis) = match planar {
-            true => ("[0, 0, -0.125]".to_string(), "[0.0021, 0.0021, 0.00005]".to_string(),
-                format!("[0, 0, {}]", if k > 1 { -0.25 } else { 0.0 }), "[0, 0, 0]".to_string(), "[0, 1, 0]".to_string()),
-            false => (three(-0.2, 0.2), "{ xx = 0.021, yy = 0.023, zz = 0.018, xy = 0.002, xz = -0.003, yz = 0.0014 }".to_string(),
-                three(-0.4, 0.4), three(-3.0, 3.0), three(0.1, 1.0)),
+            true => (
+                "[0, 0, -0.125]".to_string(),
+                "[0.0021, 0.0021, 0.00005]".to_string(),
+                format!("[0, 0, {}]", if k > 1 { -0.25 } else { 0.0 }),
+                "[0, 0, 0]".to_string(),
+                "[0, 1, 0]".to_string(),
+            ),
+            false => (
+                three(-0.2, 0.2),
+                "{ xx = 0.021, yy = 0.023, zz = 0.018, xy = 0.002, xz = -0.003, yz = 0.0014 }".to_string(),
+                three(-0.4, 0.4),
+                three(-3.0, 3.0),
+                three(0.1, 1.0),
+            ),
         };
         let mass = if planar { 0.4 } else { random(0.5, 3.0) };
         let _ = writeln!(

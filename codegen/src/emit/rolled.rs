@@ -9,7 +9,7 @@ use super::names::{heading, Names};
 use super::numbers::{minus, signed};
 use crate::options::Precision;
 use crate::plan::Plan;
-use crate::rolled::{Block, Loop, Place, Repeat, RolledProgram, Start, SweepDirection, Target};
+use crate::rolled::{Block, Loop, Place, Repeat, RolledProgram, Start, Target};
 use crate::symbolic::angles::Angles;
 use crate::symbolic::Op;
 
@@ -147,7 +147,7 @@ impl<'a> RolledWriter<'a> {
             let _ = writeln!(out, "            for l in 0..LANES {{ carried{k}[l] = {start}; }}");
         }
         let turns = self.program.loops[repeat.run].table.len();
-        let order = if backward(repeat) { format!("(0..{turns}).rev()") } else { format!("0..{turns}") };
+        let order = if repeat.is_backward() { format!("(0..{turns}).rev()") } else { format!("0..{turns}") };
         let _ = writeln!(out, "            for k in {order} {{");
         self.open_rows(out, k, repeat);
         self.body(out, k, "                ");
@@ -168,7 +168,7 @@ impl<'a> RolledWriter<'a> {
             let Some(of) = source.repeat.as_ref().filter(|of| of.run == repeat.run) else { continue };
             if kept.iter().any(|row| read.contains(row)) {
                 let turns = self.program.loops[repeat.run].table.len();
-                let number = if backward(of) { format!("{} - k", turns - 1) } else { "k".to_string() };
+                let number = if of.is_backward() { format!("{} - k", turns - 1) } else { "k".to_string() };
                 let _ = writeln!(out, "                let row{from} = rows{from}.row({number});");
             }
         }
@@ -374,11 +374,6 @@ impl<'a> RolledWriter<'a> {
             place => self.given_input(place).unwrap_or_default(),
         }
     }
-}
-
-/// Whether a loop goes from the last turn to the first.
-fn backward(repeat: &Repeat) -> bool {
-    repeat.way == Some(SweepDirection::TipToBase)
 }
 
 /// Numbers of the turn's row that a block writes and a later one reads.

@@ -97,6 +97,13 @@ pub struct Repeat {
     pub carried: Vec<(Start, Option<usize>)>,
 }
 
+impl Repeat {
+    /// Whether the loop goes from the last turn to the first.
+    pub fn is_backward(&self) -> bool {
+        self.way == Some(SweepDirection::TipToBase)
+    }
+}
+
 /// Straight-line code, or the body of a loop.
 #[derive(Clone, Debug)]
 pub struct Block {
