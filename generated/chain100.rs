@@ -545,36 +545,41 @@ impl Chain100 {
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut kept = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 27]);
-        let mut rows0 = [[[0.0; LANES]; 48]; 49];
-        {
-            let mut angles0 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
-            let mut angles1 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
+        let mut rows1 = ::multibody::runtime::kernel::PushedRows::<f64, LANES, 48, 49>::new();
+        let (sines1, cosines1) = if LANES == 1 {
+            let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 98]);
             for k in 0..49 {
+                let table = &Self::RATES_TABLE0[k];
                 for l in 0..LANES {
                     let q_1 = q.get(1 + 2 * k, l);
                     let q_2 = q.get(2 + 2 * k, l);
-                    angles0[k][l] = q_1;
-                    angles1[k][l] = q_2;
+                    angles[2 * k + 0][l] = q_1;
+                    angles[2 * k + 1][l] = q_2;
                 }
             }
-            let (sines0, cosines0) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 49>(&angles0);
-            let (sines1, cosines1) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 49>(&angles1);
-            for k in 0..49 {
-                rows0[k][2] = sines0[k];
-                rows0[k][3] = cosines0[k];
-                rows0[k][4] = sines1[k];
-                rows0[k][5] = cosines1[k];
-            }
-        }
+            ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 98>(&angles)
+        } else { ([[0.0; LANES]; 98], [[0.0; LANES]; 98]) };
         {
+            let (sines, cosines) = {
+                let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+                for l in 0..LANES {
+                    let q_0 = q.get(0, l);
+                    let q_99 = q.get(99, l);
+                    angles[0][l] = q_0;
+                    angles[1][l] = q_99;
+                }
+                ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles)
+            };
+            let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+            for l in 0..LANES { given[0][l] = p.get(99, l); }
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 23]);
             for l in 0..LANES {
-                let q_0 = q.get(0, l);
                 // link1: sine and cosine, rotation
-                let (link1_sin, link1_cos) = ::multibody::runtime::trig::pair_f64::<::multibody::runtime::kernel::Plain>(q_0);
-                let q_99 = q.get(99, l);
+                let link1_sin = sines[0][l];
+                let link1_cos = cosines[0][l];
                 // link100: sine and cosine, rotation
-                let (link100_sin, link100_cos) = ::multibody::runtime::trig::pair_f64::<::multibody::runtime::kernel::Plain>(q_99);
+                let link100_sin = sines[1][l];
+                let link100_cos = cosines[1][l];
                 // link100: inertia carried to the parent, M* (4.48)
                 let link100_minus_u_x = 0.0003 * link100_sin;
                 let link100_u_y = 0.0003 * link100_cos;
@@ -597,7 +602,7 @@ impl Chain100 {
                 let link100_t6 = link100_u_y + link100_u_y;
                 let link100_t7 = 0.03 * link100_t6;
                 let link100_t8 = link100_minus_mp_ry_ry - link100_t7;
-                let p_99 = p.get(99, l);
+                let p_99 = given[0][l];
                 // link100: bias momentum D, D' (4.45, 4.49)
                 let link100_e = 151515.15151515152 * p_99;
                 let link100_minus_dp_x = link100_minus_u_x * link100_e;
@@ -700,9 +705,21 @@ impl Chain100 {
             let mut carried29 = [0.0; LANES];
             for l in 0..LANES { carried29[l] = kept[4][l]; }
             for k in (0..49).rev() {
-                let row = &mut rows0[k];
                 let table = &Self::RATES_TABLE0[k];
-                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 74]);
+                let (sines, cosines) = if LANES == 1 { ([sines1[2 * k + 0], sines1[2 * k + 1]], [cosines1[2 * k + 0], cosines1[2 * k + 1]]) } else {
+                    let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+                    for l in 0..LANES {
+                        let q_1 = q.get(1 + 2 * k, l);
+                        let q_2 = q.get(2 + 2 * k, l);
+                        angles[0][l] = q_1;
+                        angles[1][l] = q_2;
+                    }
+                    ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles)
+                };
+                let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+                for l in 0..LANES { given[0][l] = p.get(2 + 2 * k, l); }
+                for l in 0..LANES { given[1][l] = p.get(1 + 2 * k, l); }
+                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 78]);
                 for l in 0..LANES {
                     let table_4 = table[4];
                     let carried_15 = carried15[l];
@@ -710,75 +727,75 @@ impl Chain100 {
                     let table_5 = table[5];
                     let carried_20 = carried20[l];
                     let link2_m_rz_rz = table_5 + carried_20;
-                    let row_5 = row[5][l];
-                    let link2_t0 = row_5 + row_5;
+                    let link2_cos = cosines[1][l];
+                    let link2_t0 = link2_cos + link2_cos;
                     let carried_2 = carried2[l];
-                    let link2_mp_xz = carried_2 * row_5;
-                    let row_4 = row[4][l];
-                    let link2_mp_yz = carried_2 * row_4;
+                    let link2_mp_xz = carried_2 * link2_cos;
+                    let link2_sin = sines[1][l];
+                    let link2_mp_yz = carried_2 * link2_sin;
                     let carried_18 = carried18[l];
                     let link2_t1 = carried_18 - link2_m_rx_rx;
-                    let link2_t2 = row_4 * link2_t1;
+                    let link2_t2 = link2_sin * link2_t1;
                     let carried_17 = carried17[l];
-                    let link2_u_rx = carried_17 * row_5;
-                    let link2_u_ry = carried_17 * row_4;
+                    let link2_u_rx = carried_17 * link2_cos;
+                    let link2_u_ry = carried_17 * link2_sin;
                     let link2_rho = 1.0 / link2_m_rz_rz;
                     let carried_21 = carried21[l];
-                    let link2_t3 = carried_21 * row_5;
-                    let link2_t4 = carried_21 * row_4;
+                    let link2_t3 = carried_21 * link2_cos;
+                    let link2_t4 = carried_21 * link2_sin;
                     let carried_25 = carried25[l];
-                    let link2_t5 = carried_25 * row_4;
-                    let link2_t6 = carried_25 * row_5;
-                    let row_3 = row[3][l];
-                    let link1_t0 = row_3 + row_3;
+                    let link2_t5 = carried_25 * link2_sin;
+                    let link2_t6 = carried_25 * link2_cos;
+                    let link1_cos = cosines[0][l];
+                    let link1_t0 = link1_cos + link1_cos;
                     let carried_29 = carried29[l];
-                    let row_2 = row[2][l];
-                    let link1_t1 = carried_29 * row_2;
-                    let link1_t2 = carried_29 * row_3;
+                    let link1_sin = sines[0][l];
+                    let link1_t1 = carried_29 * link1_sin;
+                    let link1_t2 = carried_29 * link1_cos;
                     let carried_0 = carried0[l];
                     let carried_3 = carried3[l];
                     let link2_t7 = carried_0 - carried_3;
-                    let link2_t8 = row_4 * link2_t7;
+                    let link2_t8 = link2_sin * link2_t7;
                     let carried_1 = carried1[l];
                     let link2_t9 = carried_1 * link2_t0;
                     let carried_4 = carried4[l];
-                    let link2_t10 = carried_4 * row_4;
+                    let link2_t10 = carried_4 * link2_sin;
                     let link2_t11 = link2_mp_xz - link2_t10;
-                    let link2_t12 = carried_4 * row_5;
+                    let link2_t12 = carried_4 * link2_cos;
                     let link2_t13 = link2_mp_yz + link2_t12;
                     let carried_6 = carried6[l];
                     let carried_10 = carried10[l];
                     let link2_t14 = carried_6 - carried_10;
-                    let link2_t15 = row_4 * link2_t14;
+                    let link2_t15 = link2_sin * link2_t14;
                     let carried_8 = carried8[l];
-                    let link2_t16 = carried_8 * row_5;
-                    let link2_t17 = carried_8 * row_4;
+                    let link2_t16 = carried_8 * link2_cos;
+                    let link2_t17 = carried_8 * link2_sin;
                     let carried_12 = carried12[l];
-                    let link2_t18 = carried_12 * row_5;
-                    let link2_t19 = carried_12 * row_4;
+                    let link2_t18 = carried_12 * link2_cos;
+                    let link2_t19 = carried_12 * link2_sin;
                     let carried_16 = carried16[l];
                     let link2_t20 = carried_16 * link2_t0;
                     let carried_19 = carried19[l];
-                    let link2_t21 = carried_19 * row_4;
-                    let link2_t22 = carried_19 * row_5;
+                    let link2_t21 = carried_19 * link2_sin;
+                    let link2_t22 = carried_19 * link2_cos;
                     let carried_14 = carried14[l];
                     let link2_k_z = carried_14 * link2_rho;
                     let link2_t23 = carried_14 * link2_k_z;
                     let carried_5 = carried5[l];
                     let link2_mp_zz = carried_5 - link2_t23;
                     let carried_22 = carried22[l];
-                    let link2_t24 = carried_22 * row_4;
+                    let link2_t24 = carried_22 * link2_sin;
                     let link2_t25 = link2_t3 - link2_t24;
-                    let link2_t26 = carried_22 * row_5;
+                    let link2_t26 = carried_22 * link2_cos;
                     let link2_t27 = link2_t4 + link2_t26;
                     let carried_24 = carried24[l];
-                    let link2_t28 = carried_24 * row_5;
+                    let link2_t28 = carried_24 * link2_cos;
                     let link2_t29 = link2_t5 - link2_t28;
-                    let link2_t30 = carried_24 * row_4;
+                    let link2_t30 = carried_24 * link2_sin;
                     let link2_t31 = link2_t6 + link2_t30;
                     let carried_28 = carried28[l];
-                    let link2_t32 = carried_28 * row_4;
-                    let link2_t33 = carried_28 * row_5;
+                    let link2_t32 = carried_28 * link2_sin;
+                    let link2_t33 = carried_28 * link2_cos;
                     let table_3 = table[3];
                     let carried_11 = carried11[l];
                     let link2_minus_m_ry_z = table_3 + carried_11;
@@ -787,33 +804,33 @@ impl Chain100 {
                     let carried_27 = carried27[l];
                     let link2_s_x = table_3 - carried_27;
                     let link2_t34 = link2_t8 - link2_t9;
-                    let link2_t35 = row_4 * link2_t34;
-                    let link2_t36 = row_5 * link2_t34;
+                    let link2_t35 = link2_sin * link2_t34;
+                    let link2_t36 = link2_cos * link2_t34;
                     let link2_t37 = carried_1 + link2_t36;
                     let link2_t38 = carried_0 - link2_t35;
                     let link2_t39 = carried_3 + link2_t35;
                     let carried_7 = carried7[l];
                     let carried_9 = carried9[l];
                     let link2_t40 = carried_7 - carried_9;
-                    let link2_t41 = row_5 * link2_t40;
+                    let link2_t41 = link2_cos * link2_t40;
                     let link2_t42 = link2_t15 - link2_t41;
-                    let link2_t43 = row_4 * link2_t42;
-                    let link2_t44 = row_5 * link2_t42;
+                    let link2_t43 = link2_sin * link2_t42;
+                    let link2_t44 = link2_cos * link2_t42;
                     let link2_t45 = carried_9 - link2_t44;
                     let link2_t46 = carried_7 + link2_t44;
                     let link2_t47 = carried_6 - link2_t43;
                     let link2_t48 = carried_10 + link2_t43;
-                    let link2_t49 = row_4 * link2_minus_m_ry_z;
+                    let link2_t49 = link2_sin * link2_minus_m_ry_z;
                     let link2_t50 = link2_t16 + link2_t49;
-                    let link2_t51 = row_5 * link2_minus_m_ry_z;
+                    let link2_t51 = link2_cos * link2_minus_m_ry_z;
                     let link2_t52 = link2_t17 - link2_t51;
-                    let link2_t53 = row_4 * link2_m_rz_y;
+                    let link2_t53 = link2_sin * link2_m_rz_y;
                     let link2_minus_u_x = link2_t18 + link2_t53;
-                    let link2_t54 = row_5 * link2_m_rz_y;
+                    let link2_t54 = link2_cos * link2_m_rz_y;
                     let link2_minus_u_y = link2_t19 - link2_t54;
                     let link2_t55 = link2_t2 + link2_t20;
-                    let link2_t56 = row_4 * link2_t55;
-                    let link2_t57 = row_5 * link2_t55;
+                    let link2_t56 = link2_sin * link2_t55;
+                    let link2_t57 = link2_cos * link2_t55;
                     let link2_t58 = carried_16 - link2_t57;
                     let link2_t59 = link2_m_rx_rx + link2_t56;
                     let link2_t60 = carried_18 - link2_t56;
@@ -877,7 +894,7 @@ impl Chain100 {
                     let link1_m_rx_rx = table_1 + link2_mp_rx_rx;
                     let table_2 = table[2];
                     let link1_m_rz_rz = table_2 + link2_t83;
-                    let p_2 = p.get(2 + 2 * k, l);
+                    let p_2 = given[0][l];
                     let carried_26 = carried26[l];
                     let link2_t84 = p_2 + carried_26;
                     let link2_e = link2_rho * link2_t84;
@@ -896,63 +913,63 @@ impl Chain100 {
                     let link1_d_ry = p_2 + link2_t90;
                     let link2_t91 = 0.03 * link2_dp_z;
                     let link1_d_rz = link2_minus_dp_ry + link2_t91;
-                    let link2_t92 = row_5 * link2_s_x;
+                    let link2_t92 = link2_cos * link2_s_x;
                     let link2_t93 = link2_t32 - link2_t92;
-                    let link2_t94 = row_4 * link2_s_x;
+                    let link2_t94 = link2_sin * link2_s_x;
                     let link1_minus_s_z = link2_t33 + link2_t94;
                     let link1_s_x = table_0 - link2_t93;
                     let link1_t3 = link2_mp_xx - link1_m_yy;
-                    let link1_t4 = row_2 * link1_t3;
+                    let link1_t4 = link1_sin * link1_t3;
                     let link1_t5 = link1_t0 * link2_minus_mp_xz;
                     let link1_t6 = link1_t4 - link1_t5;
-                    let link1_t7 = row_2 * link1_t6;
-                    let link1_t8 = row_3 * link1_t6;
+                    let link1_t7 = link1_sin * link1_t6;
+                    let link1_t8 = link1_cos * link1_t6;
                     let link1_t9 = link2_minus_mp_xz + link1_t8;
                     let link1_t10 = link2_mp_xx - link1_t7;
                     let link1_t11 = link1_m_yy + link1_t7;
-                    let link1_t12 = row_3 * link2_mp_xy;
-                    let link1_t13 = row_2 * link2_minus_mp_yz;
+                    let link1_t12 = link1_cos * link2_mp_xy;
+                    let link1_t13 = link1_sin * link2_minus_mp_yz;
                     let link1_t14 = link1_t12 + link1_t13;
-                    let link1_t15 = row_2 * link2_mp_xy;
-                    let link1_t16 = row_3 * link2_minus_mp_yz;
+                    let link1_t15 = link1_sin * link2_mp_xy;
+                    let link1_t16 = link1_cos * link2_minus_mp_yz;
                     let link1_t17 = link1_t15 - link1_t16;
                     let link1_t18 = link2_mp_rx_x + link1_minus_m_ry_y;
-                    let link1_t19 = row_2 * link1_t18;
+                    let link1_t19 = link1_sin * link1_t18;
                     let link1_t20 = link2_mp_rx_z + link1_m_ry_x;
-                    let link1_t21 = row_3 * link1_t20;
+                    let link1_t21 = link1_cos * link1_t20;
                     let link1_t22 = link1_t19 + link1_t21;
-                    let link1_t23 = row_2 * link1_t22;
-                    let link1_t24 = row_3 * link1_t22;
+                    let link1_t23 = link1_sin * link1_t22;
+                    let link1_t24 = link1_cos * link1_t22;
                     let link1_t25 = link1_m_ry_x - link1_t24;
                     let link1_t26 = link2_mp_rx_z - link1_t24;
                     let link1_t27 = link2_mp_rx_x - link1_t23;
                     let link1_t28 = link1_minus_m_ry_y - link1_t23;
-                    let link1_t29 = row_3 * link2_minus_mp_rx_y;
-                    let link1_t30 = row_2 * link1_minus_m_ry_z;
+                    let link1_t29 = link1_cos * link2_minus_mp_rx_y;
+                    let link1_t30 = link1_sin * link1_minus_m_ry_z;
                     let link1_t31 = link1_t29 + link1_t30;
-                    let link1_t32 = row_2 * link2_minus_mp_rx_y;
-                    let link1_t33 = row_3 * link1_minus_m_ry_z;
+                    let link1_t32 = link1_sin * link2_minus_mp_rx_y;
+                    let link1_t33 = link1_cos * link1_minus_m_ry_z;
                     let link1_t34 = link1_t32 - link1_t33;
-                    let link1_t35 = row_3 * link1_minus_m_rz_x;
-                    let link1_t36 = row_2 * link1_m_rz_y;
+                    let link1_t35 = link1_cos * link1_minus_m_rz_x;
+                    let link1_t36 = link1_sin * link1_m_rz_y;
                     let link1_minus_u_x = link1_t35 + link1_t36;
-                    let link1_t37 = row_2 * link1_minus_m_rz_x;
-                    let link1_t38 = row_3 * link1_m_rz_y;
+                    let link1_t37 = link1_sin * link1_minus_m_rz_x;
+                    let link1_t38 = link1_cos * link1_m_rz_y;
                     let link1_minus_u_y = link1_t37 - link1_t38;
                     let link1_t39 = link1_m_ry_ry - link1_m_rx_rx;
-                    let link1_t40 = row_2 * link1_t39;
+                    let link1_t40 = link1_sin * link1_t39;
                     let link1_t41 = link1_t0 * link1_minus_m_rx_ry;
                     let link1_t42 = link1_t40 + link1_t41;
-                    let link1_t43 = row_2 * link1_t42;
-                    let link1_t44 = row_3 * link1_t42;
+                    let link1_t43 = link1_sin * link1_t42;
+                    let link1_t44 = link1_cos * link1_t42;
                     let link1_t45 = link1_minus_m_rx_ry - link1_t44;
                     let link1_t46 = link1_m_rx_rx + link1_t43;
                     let link1_t47 = link1_m_ry_ry - link1_t43;
-                    let link1_t48 = row_3 * link1_minus_m_rx_rz;
-                    let link1_t49 = row_2 * link1_minus_m_ry_rz;
+                    let link1_t48 = link1_cos * link1_minus_m_rx_rz;
+                    let link1_t49 = link1_sin * link1_minus_m_ry_rz;
                     let link1_minus_u_rx = link1_t48 - link1_t49;
-                    let link1_t50 = row_2 * link1_minus_m_rx_rz;
-                    let link1_t51 = row_3 * link1_minus_m_ry_rz;
+                    let link1_t50 = link1_sin * link1_minus_m_rx_rz;
+                    let link1_t51 = link1_cos * link1_minus_m_ry_rz;
                     let link1_minus_u_ry = link1_t50 + link1_t51;
                     let link1_rho = 1.0 / link1_m_rz_rz;
                     let link1_minus_k_x = link1_minus_u_x * link1_rho;
@@ -1009,19 +1026,19 @@ impl Chain100 {
                     let link1_t83 = 0.03 * link1_t82;
                     let link1_t84 = link1_mp_ry_ry - link1_t83;
                     let link1_t85 = 0.03 * link1_t77;
-                    let link1_t86 = row_3 * link2_dp_x;
-                    let link1_t87 = row_2 * link2_dp_z;
+                    let link1_t86 = link1_cos * link2_dp_x;
+                    let link1_t87 = link1_sin * link2_dp_z;
                     let link1_t88 = link1_t86 - link1_t87;
-                    let link1_t89 = row_2 * link2_dp_x;
-                    let link1_t90 = row_3 * link2_dp_z;
+                    let link1_t89 = link1_sin * link2_dp_x;
+                    let link1_t90 = link1_cos * link2_dp_z;
                     let link1_t91 = link1_t89 + link1_t90;
-                    let link1_t92 = row_3 * link2_dp_rx;
-                    let link1_t93 = row_2 * link1_d_ry;
+                    let link1_t92 = link1_cos * link2_dp_rx;
+                    let link1_t93 = link1_sin * link1_d_ry;
                     let link1_t94 = link1_t92 - link1_t93;
-                    let link1_t95 = row_2 * link2_dp_rx;
-                    let link1_t96 = row_3 * link1_d_ry;
+                    let link1_t95 = link1_sin * link2_dp_rx;
+                    let link1_t96 = link1_cos * link1_d_ry;
                     let link1_t97 = link1_t95 + link1_t96;
-                    let p_1 = p.get(1 + 2 * k, l);
+                    let p_1 = given[1][l];
                     let link1_t98 = p_1 - link1_d_rz;
                     let link1_e = link1_rho * link1_t98;
                     let link1_t99 = link1_minus_u_x * link1_e;
@@ -1038,9 +1055,9 @@ impl Chain100 {
                     let link1_t105 = p_1 + link1_t104;
                     let link1_t106 = 0.03 * link1_minus_dp_z;
                     let link1_t107 = link1_dp_ry + link1_t106;
-                    let link1_t108 = row_3 * link1_s_x;
+                    let link1_t108 = link1_cos * link1_s_x;
                     let link1_t109 = link1_t1 - link1_t108;
-                    let link1_t110 = row_2 * link1_s_x;
+                    let link1_t110 = link1_sin * link1_s_x;
                     let link1_t111 = link1_t2 + link1_t110;
                     let link1_t112 = link1_mp_xx - link1_mp_yy;
                     let link1_t113 = link1_mp_rx_x + link1_minus_mp_ry_y;
@@ -1124,6 +1141,10 @@ impl Chain100 {
                     results[71][l] = link2_t96;
                     results[72][l] = link2_t97;
                     results[73][l] = link2_t98;
+                    results[74][l] = link1_sin;
+                    results[75][l] = link1_cos;
+                    results[76][l] = link2_sin;
+                    results[77][l] = link2_cos;
                 }
                 carried0 = results[0];
                 carried1 = results[1];
@@ -1155,50 +1176,7 @@ impl Chain100 {
                 carried27 = results[27];
                 carried28 = results[28];
                 carried29 = results[29];
-                row[0] = results[30];
-                row[1] = results[31];
-                row[6] = results[32];
-                row[7] = results[33];
-                row[8] = results[34];
-                row[9] = results[35];
-                row[10] = results[36];
-                row[11] = results[37];
-                row[12] = results[38];
-                row[13] = results[39];
-                row[14] = results[40];
-                row[15] = results[41];
-                row[16] = results[42];
-                row[17] = results[43];
-                row[18] = results[44];
-                row[19] = results[45];
-                row[20] = results[46];
-                row[21] = results[47];
-                row[22] = results[48];
-                row[23] = results[49];
-                row[24] = results[50];
-                row[25] = results[51];
-                row[26] = results[52];
-                row[27] = results[53];
-                row[28] = results[54];
-                row[29] = results[55];
-                row[30] = results[56];
-                row[31] = results[57];
-                row[32] = results[58];
-                row[33] = results[59];
-                row[34] = results[60];
-                row[35] = results[61];
-                row[36] = results[62];
-                row[37] = results[63];
-                row[38] = results[64];
-                row[39] = results[65];
-                row[40] = results[66];
-                row[41] = results[67];
-                row[42] = results[68];
-                row[43] = results[69];
-                row[44] = results[70];
-                row[45] = results[71];
-                row[46] = results[72];
-                row[47] = results[73];
+                rows1.push([results[30], results[31], results[32], results[33], results[34], results[35], results[36], results[37], results[38], results[39], results[40], results[41], results[42], results[43], results[44], results[45], results[46], results[47], results[48], results[49], results[50], results[51], results[52], results[53], results[54], results[55], results[56], results[57], results[58], results[59], results[60], results[61], results[62], results[63], results[64], results[65], results[66], results[67], results[68], results[69], results[70], results[71], results[72], results[73], results[74], results[75], results[76], results[77]]);
             }
             kept[23] = carried20;
             kept[24] = carried26;
@@ -1206,6 +1184,8 @@ impl Chain100 {
             kept[26] = carried28;
         }
         {
+            let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+            for l in 0..LANES { given[0][l] = p.get(0, l); }
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
             for l in 0..LANES {
                 let kept_23 = kept[23][l];
@@ -1215,7 +1195,7 @@ impl Chain100 {
                 let link1_minus_s_x = kept_25 - 0.05970000000000004;
                 // link1: U, Mj, k and the reduced inertia M' (4.44)
                 let link1_rho = 1.0 / link1_m_rz_rz;
-                let p_0 = p.get(0, l);
+                let p_0 = given[0][l];
                 let kept_24 = kept[24][l];
                 // link1: bias momentum D, D' (4.45, 4.49)
                 let link1_t0 = p_0 + kept_24;
@@ -1258,43 +1238,46 @@ impl Chain100 {
             for l in 0..LANES { carried7[l] = -kept[17][l]; }
             let mut carried8 = [0.0; LANES];
             for k in 0..49 {
-                let row = &mut rows0[k];
+                let row1 = rows1.row(48 - k);
+                let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+                for l in 0..LANES { given[0][l] = tau.get(1 + 2 * k, l); }
+                for l in 0..LANES { given[1][l] = tau.get(2 + 2 * k, l); }
                 let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 13]);
                 for l in 0..LANES {
                     let carried_5 = carried5[l];
                     let link1_minus_hat_z = 0.03 * carried_5;
-                    let row_28 = row[28][l];
+                    let row_28 = row1[24][l];
                     let link1_t0 = row_28 * carried_5;
-                    let row_2 = row[2][l];
+                    let row_2 = row1[44][l];
                     let link1_omega_rx = row_2 * carried_5;
-                    let row_3 = row[3][l];
+                    let row_3 = row1[45][l];
                     let link1_omega_ry = row_3 * carried_5;
                     let carried_6 = carried6[l];
                     let link1_g_x = row_3 * carried_6;
                     let link1_minus_g_y = row_2 * carried_6;
-                    let row_41 = row[41][l];
+                    let row_41 = row1[37][l];
                     let link1_t1 = carried_5 * row_41;
-                    let row_43 = row[43][l];
+                    let row_43 = row1[39][l];
                     let link1_t2 = carried_5 * row_43;
-                    let row_42 = row[42][l];
+                    let row_42 = row1[38][l];
                     let link1_t3 = carried_5 * row_42;
-                    let row_34 = row[34][l];
+                    let row_34 = row1[30][l];
                     let link1_t4 = row_34 * carried_5;
-                    let row_4 = row[4][l];
+                    let row_4 = row1[46][l];
                     let carried_7 = carried7[l];
                     let link2_t0 = row_4 * carried_7;
-                    let row_5 = row[5][l];
+                    let row_5 = row1[47][l];
                     let link2_t1 = row_5 * carried_7;
                     let carried_1 = carried1[l];
                     let link1_minus_hat_z_2 = carried_1 + link1_minus_hat_z;
                     let carried_4 = carried4[l];
                     let link1_t5 = 0.03 * carried_4;
-                    let row_24 = row[24][l];
+                    let row_24 = row1[20][l];
                     let carried_0 = carried0[l];
                     let link1_t6 = row_24 * carried_0;
-                    let row_26 = row[26][l];
+                    let row_26 = row1[22][l];
                     let link1_t7 = row_26 * link1_minus_hat_z_2;
-                    let row_27 = row[27][l];
+                    let row_27 = row1[23][l];
                     let carried_3 = carried3[l];
                     let link1_t8 = row_27 * carried_3;
                     let link1_t9 = link1_t0 + link1_t8;
@@ -1307,56 +1290,56 @@ impl Chain100 {
                     let carried_8 = carried8[l];
                     let link1_t14 = row_2 * carried_8;
                     let link1_t15 = row_3 * carried_8;
-                    let row_29 = row[29][l];
+                    let row_29 = row1[25][l];
                     let link1_t16 = row_29 * carried_0;
                     let link1_t17 = carried_3 * row_43;
-                    let row_31 = row[31][l];
+                    let row_31 = row1[27][l];
                     let link1_t18 = row_31 * link1_minus_hat_z_2;
                     let link1_t19 = carried_3 * row_41;
-                    let row_30 = row[30][l];
+                    let row_30 = row1[26][l];
                     let link1_t20 = row_30 * link1_minus_hat_z_2;
                     let link1_t21 = row_34 * carried_3;
                     let link1_t22 = link1_t3 - link1_t21;
-                    let row_33 = row[33][l];
+                    let row_33 = row1[29][l];
                     let link1_t23 = row_33 * link1_minus_hat_z_2;
                     let link1_t24 = link1_t22 + link1_t23;
-                    let row_39 = row[39][l];
+                    let row_39 = row1[35][l];
                     let link1_t25 = row_39 - link1_t24;
-                    let row_32 = row[32][l];
+                    let row_32 = row1[28][l];
                     let link1_t26 = row_32 * link1_minus_hat_z_2;
                     let link1_t27 = link1_t4 - link1_t26;
-                    let row_38 = row[38][l];
+                    let row_38 = row1[34][l];
                     let link1_t28 = row_38 + link1_t27;
                     let link1_t29 = carried_3 * link1_t25;
                     let link1_t30 = carried_5 * link1_t28;
                     let link2_t2 = 0.03 * link1_omega_ry_2;
                     let link2_hat_y = link1_minus_hat_z_2 + link2_t2;
-                    let row_9 = row[9][l];
+                    let row_9 = row1[5][l];
                     let link2_t3 = row_9 * link2_hat_y;
-                    let row_10 = row[10][l];
+                    let row_10 = row1[6][l];
                     let link2_t4 = row_10 * link1_omega_rx_2;
                     let link2_t5 = row_4 * link2_hat_y;
                     let link2_t6 = row_5 * link2_hat_y;
                     let link2_t7 = row_5 * link1_omega_rx_2;
                     let link2_t8 = row_4 * link1_omega_rx_2;
-                    let row_44 = row[44][l];
+                    let row_44 = row1[40][l];
                     let link2_t9 = row_44 * link2_hat_y;
-                    let row_47 = row[47][l];
+                    let row_47 = row1[43][l];
                     let link2_t10 = row_47 * link1_omega_rx_2;
-                    let row_12 = row[12][l];
+                    let row_12 = row1[8][l];
                     let link2_t11 = row_12 * link2_hat_y;
-                    let row_45 = row[45][l];
+                    let row_45 = row1[41][l];
                     let link2_t12 = row_45 * link1_omega_rx_2;
-                    let row_17 = row[17][l];
+                    let row_17 = row1[13][l];
                     let link2_t13 = row_17 * link1_omega_rx_2;
                     let carried_2 = carried2[l];
                     let link1_hat_y = carried_2 + link1_t5;
-                    let row_25 = row[25][l];
+                    let row_25 = row1[21][l];
                     let link1_t31 = row_25 * link1_hat_y;
                     let link1_t32 = link1_t6 + link1_t31;
                     let link1_t33 = link1_t7 + link1_t32;
                     let link1_t34 = link1_t9 + link1_t33;
-                    let row_35 = row[35][l];
+                    let row_35 = row1[31][l];
                     let link1_omega_rz = row_35 + link1_t34;
                     let link1_minus_v = carried_4 - link1_omega_rz;
                     let link1_t35 = row_2 * link1_hat_y;
@@ -1365,28 +1348,28 @@ impl Chain100 {
                     let link1_minus_omega_y = link1_t11 - link1_t36;
                     let link1_g_x_2 = link1_g_x - link1_t14;
                     let link1_minus_g_y_2 = link1_minus_g_y + link1_t15;
-                    let row_40 = row[40][l];
+                    let row_40 = row1[36][l];
                     let link1_t37 = row_40 * link1_hat_y;
                     let link1_t38 = link1_t16 - link1_t37;
                     let link1_t39 = link1_t17 - link1_t38;
                     let link1_t40 = link1_t1 + link1_t39;
                     let link1_t41 = link1_t18 - link1_t40;
-                    let row_37 = row[37][l];
+                    let row_37 = row1[33][l];
                     let link1_t42 = row_37 + link1_t41;
                     let link1_t43 = row_29 * link1_hat_y;
                     let link1_t44 = link1_t2 - link1_t43;
                     let link1_t45 = link1_t19 - link1_t44;
                     let link1_t46 = link1_t20 + link1_t45;
-                    let row_36 = row[36][l];
+                    let row_36 = row1[32][l];
                     let link1_t47 = row_36 + link1_t46;
                     let link1_t48 = carried_0 * link1_t42;
                     let link1_t49 = link1_hat_y * link1_t47;
                     let link1_t50 = link1_t48 - link1_t49;
                     let link1_t51 = link1_t29 + link1_t50;
                     let link1_t52 = link1_t30 - link1_t51;
-                    let row_23 = row[23][l];
+                    let row_23 = row1[19][l];
                     let link1_t53 = row_23 * link1_minus_g_y_2;
-                    let row_1 = row[1][l];
+                    let row_1 = row1[1][l];
                     let link1_t54 = row_1 * link1_g_x_2;
                     let link1_t55 = link1_t53 + link1_t54;
                     let link1_t56 = link1_t52 - link1_t55;
@@ -1394,17 +1377,17 @@ impl Chain100 {
                     let link1_t58 = link1_t56 + link1_t57;
                     let link2_t14 = 0.03 * link1_omega_rz;
                     let link2_minus_hat_z = link1_minus_omega_y - link2_t14;
-                    let row_8 = row[8][l];
+                    let row_8 = row1[4][l];
                     let link2_t15 = row_8 * link1_omega_x;
                     let link2_t16 = link2_t3 + link2_t15;
-                    let row_6 = row[6][l];
+                    let row_6 = row1[2][l];
                     let link2_t17 = row_6 * link2_minus_hat_z;
                     let link2_t18 = link2_t16 + link2_t17;
-                    let row_11 = row[11][l];
+                    let row_11 = row1[7][l];
                     let link2_t19 = row_11 * link1_omega_rz;
                     let link2_t20 = link2_t4 - link2_t19;
                     let link2_t21 = link2_t18 - link2_t20;
-                    let row_18 = row[18][l];
+                    let row_18 = row1[14][l];
                     let link2_omega_rz = row_18 + link2_t21;
                     let link2_minus_v = link1_omega_ry_2 - link2_omega_rz;
                     let link2_t22 = row_5 * link1_omega_x;
@@ -1424,32 +1407,32 @@ impl Chain100 {
                     let link2_t30 = link2_t10 - link2_t29;
                     let link2_t31 = row_45 * link1_omega_rz;
                     let link2_t32 = link2_t30 + link2_t31;
-                    let row_14 = row[14][l];
+                    let row_14 = row1[10][l];
                     let link2_t33 = row_14 * link2_minus_hat_z;
                     let link2_t34 = link2_t32 + link2_t33;
-                    let row_20 = row[20][l];
+                    let row_20 = row1[16][l];
                     let link2_t35 = row_20 + link2_t34;
                     let link2_t36 = row_47 * link1_omega_rz;
                     let link2_t37 = link2_t11 - link2_t36;
                     let link2_t38 = link2_t12 + link2_t37;
-                    let row_13 = row[13][l];
+                    let row_13 = row1[9][l];
                     let link2_t39 = row_13 * link2_minus_hat_z;
                     let link2_t40 = link2_t38 + link2_t39;
-                    let row_19 = row[19][l];
+                    let row_19 = row1[15][l];
                     let link2_t41 = row_19 + link2_t40;
-                    let row_46 = row[46][l];
+                    let row_46 = row1[42][l];
                     let link2_t42 = row_46 * link1_omega_rz;
                     let link2_t43 = link2_t13 + link2_t42;
-                    let row_16 = row[16][l];
+                    let row_16 = row1[12][l];
                     let link2_t44 = row_16 * link2_minus_hat_z;
                     let link2_t45 = link2_t43 - link2_t44;
-                    let row_22 = row[22][l];
+                    let row_22 = row1[18][l];
                     let link2_t46 = row_22 - link2_t45;
                     let link2_t47 = row_17 * link1_omega_rz;
-                    let row_15 = row[15][l];
+                    let row_15 = row1[11][l];
                     let link2_t48 = row_15 * link2_minus_hat_z;
                     let link2_t49 = link2_t47 + link2_t48;
-                    let row_21 = row[21][l];
+                    let row_21 = row1[17][l];
                     let link2_t50 = row_21 - link2_t49;
                     let link2_t51 = link1_omega_x * link2_t35;
                     let link2_t52 = link2_hat_y * link2_t41;
@@ -1458,17 +1441,17 @@ impl Chain100 {
                     let link2_t55 = link2_t53 - link2_t54;
                     let link2_t56 = link1_omega_rz * link2_t50;
                     let link2_t57 = link2_t55 + link2_t56;
-                    let row_7 = row[7][l];
+                    let row_7 = row1[3][l];
                     let link2_t58 = row_7 * link2_g_y;
-                    let row_0 = row[0][l];
+                    let row_0 = row1[0][l];
                     let link2_t59 = row_0 * link2_g_x;
                     let link2_t60 = link2_t58 - link2_t59;
                     let link2_t61 = link2_t57 - link2_t60;
                     let link2_t62 = 1e-5 * link2_minus_v;
                     let link2_t63 = link2_t61 - link2_t62;
-                    let tau_1 = tau.get(1 + 2 * k, l);
+                    let tau_1 = given[0][l];
                     let link2_t64 = tau_1 + link1_t58;
-                    let tau_2 = tau.get(2 + 2 * k, l);
+                    let tau_2 = given[1][l];
                     let link2_t65 = tau_2 - link2_t63;
                     results[0][l] = link2_omega_x;
                     results[1][l] = link2_omega_y;
@@ -1508,6 +1491,9 @@ impl Chain100 {
             kept[14] = carried8;
         }
         {
+            let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+            for l in 0..LANES { given[0][l] = tau.get(0, l); }
+            for l in 0..LANES { given[1][l] = tau.get(99, l); }
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 3]);
             for l in 0..LANES {
                 let kept_0 = kept[0][l];
@@ -1575,10 +1561,10 @@ impl Chain100 {
                 let link100_t31 = link100_t29 + link100_t30;
                 let link100_t32 = 1e-5 * link100_minus_v;
                 let link100_t33 = link100_t31 - link100_t32;
-                let tau_0 = tau.get(0, l);
+                let tau_0 = given[0][l];
                 let kept_16 = kept[16][l];
                 let link100_t34 = tau_0 + kept_16;
-                let tau_99 = tau.get(99, l);
+                let tau_99 = given[1][l];
                 let link100_t35 = tau_99 - link100_t33;
                 results[0][l] = -link100_minus_v;
                 results[1][l] = link100_t34;
@@ -1652,33 +1638,36 @@ impl Chain100 {
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut kept = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 19]);
-        let mut rows0 = [[[0.0; LANES]; 16]; 49];
-        {
-            let mut angles0 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
-            let mut angles1 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
+        let mut rows1 = ::multibody::runtime::kernel::PushedRows::<f64, LANES, 16, 49>::new();
+        let (sines1, cosines1) = if LANES == 1 {
+            let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 98]);
             for k in 0..49 {
+                let table = &Self::VELOCITIES_TABLE0[k];
                 for l in 0..LANES {
                     let q_1 = q.get(1 + 2 * k, l);
                     let q_2 = q.get(2 + 2 * k, l);
-                    angles0[k][l] = q_1;
-                    angles1[k][l] = q_2;
+                    angles[2 * k + 0][l] = q_1;
+                    angles[2 * k + 1][l] = q_2;
                 }
             }
-            let (sines0, cosines0) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 49>(&angles0);
-            let (sines1, cosines1) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 49>(&angles1);
-            for k in 0..49 {
-                rows0[k][0] = sines0[k];
-                rows0[k][1] = cosines0[k];
-                rows0[k][2] = sines1[k];
-                rows0[k][3] = cosines1[k];
-            }
-        }
+            ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 98>(&angles)
+        } else { ([[0.0; LANES]; 98], [[0.0; LANES]; 98]) };
         {
+            let (sines, cosines) = {
+                let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+                for l in 0..LANES {
+                    let q_99 = q.get(99, l);
+                    angles[0][l] = q_99;
+                }
+                ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles)
+            };
+            let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+            for l in 0..LANES { given[0][l] = p.get(99, l); }
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 17]);
             for l in 0..LANES {
-                let q_99 = q.get(99, l);
                 // link100: sine and cosine, rotation
-                let (link100_sin, link100_cos) = ::multibody::runtime::trig::pair_f64::<::multibody::runtime::kernel::Plain>(q_99);
+                let link100_sin = sines[0][l];
+                let link100_cos = cosines[0][l];
                 // link100: inertia carried to the parent, M* (4.48)
                 let link100_minus_u_x = 0.0003 * link100_sin;
                 let link100_u_y = 0.0003 * link100_cos;
@@ -1701,7 +1690,7 @@ impl Chain100 {
                 let link100_t6 = link100_u_y + link100_u_y;
                 let link100_t7 = 0.03 * link100_t6;
                 let link100_t8 = link100_minus_mp_ry_ry - link100_t7;
-                let p_99 = p.get(99, l);
+                let p_99 = given[0][l];
                 // link100: bias momentum D, D' (4.45, 4.49)
                 let link100_e = 151515.15151515152 * p_99;
                 let link100_minus_dp_x = link100_minus_u_x * link100_e;
@@ -1787,9 +1776,21 @@ impl Chain100 {
             for l in 0..LANES { carried25[l] = kept[16][l]; }
             let mut carried26 = [0.0; LANES];
             for k in (0..49).rev() {
-                let row = &mut rows0[k];
                 let table = &Self::VELOCITIES_TABLE0[k];
-                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 39]);
+                let (sines, cosines) = if LANES == 1 { ([sines1[2 * k + 0], sines1[2 * k + 1]], [cosines1[2 * k + 0], cosines1[2 * k + 1]]) } else {
+                    let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+                    for l in 0..LANES {
+                        let q_1 = q.get(1 + 2 * k, l);
+                        let q_2 = q.get(2 + 2 * k, l);
+                        angles[0][l] = q_1;
+                        angles[1][l] = q_2;
+                    }
+                    ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles)
+                };
+                let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+                for l in 0..LANES { given[0][l] = p.get(2 + 2 * k, l); }
+                for l in 0..LANES { given[1][l] = p.get(1 + 2 * k, l); }
+                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 43]);
                 for l in 0..LANES {
                     let table_4 = table[4];
                     let carried_15 = carried15[l];
@@ -1797,67 +1798,67 @@ impl Chain100 {
                     let table_5 = table[5];
                     let carried_20 = carried20[l];
                     let link2_m_rz_rz = table_5 + carried_20;
-                    let row_3 = row[3][l];
-                    let link2_t0 = row_3 + row_3;
+                    let link2_cos = cosines[1][l];
+                    let link2_t0 = link2_cos + link2_cos;
                     let carried_2 = carried2[l];
-                    let link2_mp_xz = carried_2 * row_3;
-                    let row_2 = row[2][l];
-                    let link2_mp_yz = carried_2 * row_2;
+                    let link2_mp_xz = carried_2 * link2_cos;
+                    let link2_sin = sines[1][l];
+                    let link2_mp_yz = carried_2 * link2_sin;
                     let carried_18 = carried18[l];
                     let link2_t1 = carried_18 - link2_m_rx_rx;
-                    let link2_t2 = row_2 * link2_t1;
+                    let link2_t2 = link2_sin * link2_t1;
                     let carried_17 = carried17[l];
-                    let link2_u_rx = carried_17 * row_3;
-                    let link2_u_ry = carried_17 * row_2;
+                    let link2_u_rx = carried_17 * link2_cos;
+                    let link2_u_ry = carried_17 * link2_sin;
                     let link2_rho = 1.0 / link2_m_rz_rz;
                     let carried_21 = carried21[l];
-                    let link2_t3 = carried_21 * row_3;
-                    let link2_t4 = carried_21 * row_2;
+                    let link2_t3 = carried_21 * link2_cos;
+                    let link2_t4 = carried_21 * link2_sin;
                     let carried_25 = carried25[l];
-                    let link2_t5 = carried_25 * row_2;
-                    let link2_t6 = carried_25 * row_3;
-                    let row_1 = row[1][l];
-                    let link1_t0 = row_1 + row_1;
+                    let link2_t5 = carried_25 * link2_sin;
+                    let link2_t6 = carried_25 * link2_cos;
+                    let link1_cos = cosines[0][l];
+                    let link1_t0 = link1_cos + link1_cos;
                     let carried_0 = carried0[l];
                     let carried_3 = carried3[l];
                     let link2_t7 = carried_0 - carried_3;
-                    let link2_t8 = row_2 * link2_t7;
+                    let link2_t8 = link2_sin * link2_t7;
                     let carried_1 = carried1[l];
                     let link2_t9 = carried_1 * link2_t0;
                     let carried_4 = carried4[l];
-                    let link2_t10 = carried_4 * row_2;
+                    let link2_t10 = carried_4 * link2_sin;
                     let link2_t11 = link2_mp_xz - link2_t10;
-                    let link2_t12 = carried_4 * row_3;
+                    let link2_t12 = carried_4 * link2_cos;
                     let link2_t13 = link2_mp_yz + link2_t12;
                     let carried_6 = carried6[l];
                     let carried_10 = carried10[l];
                     let link2_t14 = carried_6 - carried_10;
-                    let link2_t15 = row_2 * link2_t14;
+                    let link2_t15 = link2_sin * link2_t14;
                     let carried_8 = carried8[l];
-                    let link2_t16 = carried_8 * row_3;
-                    let link2_t17 = carried_8 * row_2;
+                    let link2_t16 = carried_8 * link2_cos;
+                    let link2_t17 = carried_8 * link2_sin;
                     let carried_12 = carried12[l];
-                    let link2_t18 = carried_12 * row_3;
-                    let link2_t19 = carried_12 * row_2;
+                    let link2_t18 = carried_12 * link2_cos;
+                    let link2_t19 = carried_12 * link2_sin;
                     let carried_16 = carried16[l];
                     let link2_t20 = carried_16 * link2_t0;
                     let carried_19 = carried19[l];
-                    let link2_t21 = carried_19 * row_2;
-                    let link2_t22 = carried_19 * row_3;
+                    let link2_t21 = carried_19 * link2_sin;
+                    let link2_t22 = carried_19 * link2_cos;
                     let carried_14 = carried14[l];
                     let link2_k_z = carried_14 * link2_rho;
                     let link2_t23 = carried_14 * link2_k_z;
                     let carried_5 = carried5[l];
                     let link2_mp_zz = carried_5 - link2_t23;
                     let carried_22 = carried22[l];
-                    let link2_t24 = carried_22 * row_2;
+                    let link2_t24 = carried_22 * link2_sin;
                     let link2_t25 = link2_t3 - link2_t24;
-                    let link2_t26 = carried_22 * row_3;
+                    let link2_t26 = carried_22 * link2_cos;
                     let link2_t27 = link2_t4 + link2_t26;
                     let carried_24 = carried24[l];
-                    let link2_t28 = carried_24 * row_3;
+                    let link2_t28 = carried_24 * link2_cos;
                     let link2_t29 = link2_t5 - link2_t28;
-                    let link2_t30 = carried_24 * row_2;
+                    let link2_t30 = carried_24 * link2_sin;
                     let link2_t31 = link2_t6 + link2_t30;
                     let table_3 = table[3];
                     let carried_11 = carried11[l];
@@ -1865,33 +1866,33 @@ impl Chain100 {
                     let carried_13 = carried13[l];
                     let link2_m_rz_y = table_3 - carried_13;
                     let link2_t32 = link2_t8 - link2_t9;
-                    let link2_t33 = row_2 * link2_t32;
-                    let link2_t34 = row_3 * link2_t32;
+                    let link2_t33 = link2_sin * link2_t32;
+                    let link2_t34 = link2_cos * link2_t32;
                     let link2_t35 = carried_1 + link2_t34;
                     let link2_t36 = carried_0 - link2_t33;
                     let link2_t37 = carried_3 + link2_t33;
                     let carried_7 = carried7[l];
                     let carried_9 = carried9[l];
                     let link2_t38 = carried_7 - carried_9;
-                    let link2_t39 = row_3 * link2_t38;
+                    let link2_t39 = link2_cos * link2_t38;
                     let link2_t40 = link2_t15 - link2_t39;
-                    let link2_t41 = row_2 * link2_t40;
-                    let link2_t42 = row_3 * link2_t40;
+                    let link2_t41 = link2_sin * link2_t40;
+                    let link2_t42 = link2_cos * link2_t40;
                     let link2_t43 = carried_9 - link2_t42;
                     let link2_t44 = carried_7 + link2_t42;
                     let link2_t45 = carried_6 - link2_t41;
                     let link2_t46 = carried_10 + link2_t41;
-                    let link2_t47 = row_2 * link2_minus_m_ry_z;
+                    let link2_t47 = link2_sin * link2_minus_m_ry_z;
                     let link2_t48 = link2_t16 + link2_t47;
-                    let link2_t49 = row_3 * link2_minus_m_ry_z;
+                    let link2_t49 = link2_cos * link2_minus_m_ry_z;
                     let link2_t50 = link2_t17 - link2_t49;
-                    let link2_t51 = row_2 * link2_m_rz_y;
+                    let link2_t51 = link2_sin * link2_m_rz_y;
                     let link2_minus_u_x = link2_t18 + link2_t51;
-                    let link2_t52 = row_3 * link2_m_rz_y;
+                    let link2_t52 = link2_cos * link2_m_rz_y;
                     let link2_minus_u_y = link2_t19 - link2_t52;
                     let link2_t53 = link2_t2 + link2_t20;
-                    let link2_t54 = row_2 * link2_t53;
-                    let link2_t55 = row_3 * link2_t53;
+                    let link2_t54 = link2_sin * link2_t53;
+                    let link2_t55 = link2_cos * link2_t53;
                     let link2_t56 = carried_16 - link2_t55;
                     let link2_t57 = link2_m_rx_rx + link2_t54;
                     let link2_t58 = carried_18 - link2_t54;
@@ -1955,7 +1956,7 @@ impl Chain100 {
                     let link1_m_rx_rx = table_1 + link2_mp_rx_rx;
                     let table_2 = table[2];
                     let link1_m_rz_rz = table_2 + link2_t81;
-                    let p_2 = p.get(2 + 2 * k, l);
+                    let p_2 = given[0][l];
                     let carried_26 = carried26[l];
                     let link2_t82 = p_2 + carried_26;
                     let link2_e = link2_rho * link2_t82;
@@ -1975,58 +1976,58 @@ impl Chain100 {
                     let link2_t89 = 0.03 * link2_dp_z;
                     let link1_d_rz = link2_minus_dp_ry + link2_t89;
                     let link1_t1 = link2_mp_xx - link1_m_yy;
-                    let row_0 = row[0][l];
-                    let link1_t2 = row_0 * link1_t1;
+                    let link1_sin = sines[0][l];
+                    let link1_t2 = link1_sin * link1_t1;
                     let link1_t3 = link1_t0 * link2_minus_mp_xz;
                     let link1_t4 = link1_t2 - link1_t3;
-                    let link1_t5 = row_0 * link1_t4;
-                    let link1_t6 = row_1 * link1_t4;
+                    let link1_t5 = link1_sin * link1_t4;
+                    let link1_t6 = link1_cos * link1_t4;
                     let link1_t7 = link2_minus_mp_xz + link1_t6;
                     let link1_t8 = link2_mp_xx - link1_t5;
                     let link1_t9 = link1_m_yy + link1_t5;
-                    let link1_t10 = row_1 * link2_mp_xy;
-                    let link1_t11 = row_0 * link2_minus_mp_yz;
+                    let link1_t10 = link1_cos * link2_mp_xy;
+                    let link1_t11 = link1_sin * link2_minus_mp_yz;
                     let link1_t12 = link1_t10 + link1_t11;
-                    let link1_t13 = row_0 * link2_mp_xy;
-                    let link1_t14 = row_1 * link2_minus_mp_yz;
+                    let link1_t13 = link1_sin * link2_mp_xy;
+                    let link1_t14 = link1_cos * link2_minus_mp_yz;
                     let link1_t15 = link1_t13 - link1_t14;
                     let link1_t16 = link2_mp_rx_x + link1_minus_m_ry_y;
-                    let link1_t17 = row_0 * link1_t16;
+                    let link1_t17 = link1_sin * link1_t16;
                     let link1_t18 = link2_mp_rx_z + link1_m_ry_x;
-                    let link1_t19 = row_1 * link1_t18;
+                    let link1_t19 = link1_cos * link1_t18;
                     let link1_t20 = link1_t17 + link1_t19;
-                    let link1_t21 = row_0 * link1_t20;
-                    let link1_t22 = row_1 * link1_t20;
+                    let link1_t21 = link1_sin * link1_t20;
+                    let link1_t22 = link1_cos * link1_t20;
                     let link1_t23 = link1_m_ry_x - link1_t22;
                     let link1_t24 = link2_mp_rx_z - link1_t22;
                     let link1_t25 = link2_mp_rx_x - link1_t21;
                     let link1_t26 = link1_minus_m_ry_y - link1_t21;
-                    let link1_t27 = row_1 * link2_minus_mp_rx_y;
-                    let link1_t28 = row_0 * link1_minus_m_ry_z;
+                    let link1_t27 = link1_cos * link2_minus_mp_rx_y;
+                    let link1_t28 = link1_sin * link1_minus_m_ry_z;
                     let link1_t29 = link1_t27 + link1_t28;
-                    let link1_t30 = row_0 * link2_minus_mp_rx_y;
-                    let link1_t31 = row_1 * link1_minus_m_ry_z;
+                    let link1_t30 = link1_sin * link2_minus_mp_rx_y;
+                    let link1_t31 = link1_cos * link1_minus_m_ry_z;
                     let link1_t32 = link1_t30 - link1_t31;
-                    let link1_t33 = row_1 * link1_minus_m_rz_x;
-                    let link1_t34 = row_0 * link1_m_rz_y;
+                    let link1_t33 = link1_cos * link1_minus_m_rz_x;
+                    let link1_t34 = link1_sin * link1_m_rz_y;
                     let link1_minus_u_x = link1_t33 + link1_t34;
-                    let link1_t35 = row_0 * link1_minus_m_rz_x;
-                    let link1_t36 = row_1 * link1_m_rz_y;
+                    let link1_t35 = link1_sin * link1_minus_m_rz_x;
+                    let link1_t36 = link1_cos * link1_m_rz_y;
                     let link1_minus_u_y = link1_t35 - link1_t36;
                     let link1_t37 = link1_m_ry_ry - link1_m_rx_rx;
-                    let link1_t38 = row_0 * link1_t37;
+                    let link1_t38 = link1_sin * link1_t37;
                     let link1_t39 = link1_t0 * link1_minus_m_rx_ry;
                     let link1_t40 = link1_t38 + link1_t39;
-                    let link1_t41 = row_0 * link1_t40;
-                    let link1_t42 = row_1 * link1_t40;
+                    let link1_t41 = link1_sin * link1_t40;
+                    let link1_t42 = link1_cos * link1_t40;
                     let link1_t43 = link1_minus_m_rx_ry - link1_t42;
                     let link1_t44 = link1_m_rx_rx + link1_t41;
                     let link1_t45 = link1_m_ry_ry - link1_t41;
-                    let link1_t46 = row_1 * link1_minus_m_rx_rz;
-                    let link1_t47 = row_0 * link1_minus_m_ry_rz;
+                    let link1_t46 = link1_cos * link1_minus_m_rx_rz;
+                    let link1_t47 = link1_sin * link1_minus_m_ry_rz;
                     let link1_minus_u_rx = link1_t46 - link1_t47;
-                    let link1_t48 = row_0 * link1_minus_m_rx_rz;
-                    let link1_t49 = row_1 * link1_minus_m_ry_rz;
+                    let link1_t48 = link1_sin * link1_minus_m_rx_rz;
+                    let link1_t49 = link1_cos * link1_minus_m_ry_rz;
                     let link1_minus_u_ry = link1_t48 + link1_t49;
                     let link1_rho = 1.0 / link1_m_rz_rz;
                     let link1_minus_k_x = link1_minus_u_x * link1_rho;
@@ -2083,19 +2084,19 @@ impl Chain100 {
                     let link1_t81 = 0.03 * link1_t80;
                     let link1_t82 = link1_mp_ry_ry - link1_t81;
                     let link1_t83 = 0.03 * link1_t75;
-                    let link1_t84 = row_1 * link2_dp_x;
-                    let link1_t85 = row_0 * link2_dp_z;
+                    let link1_t84 = link1_cos * link2_dp_x;
+                    let link1_t85 = link1_sin * link2_dp_z;
                     let link1_t86 = link1_t84 - link1_t85;
-                    let link1_t87 = row_0 * link2_dp_x;
-                    let link1_t88 = row_1 * link2_dp_z;
+                    let link1_t87 = link1_sin * link2_dp_x;
+                    let link1_t88 = link1_cos * link2_dp_z;
                     let link1_t89 = link1_t87 + link1_t88;
-                    let link1_t90 = row_1 * link2_dp_rx;
-                    let link1_t91 = row_0 * link1_d_ry;
+                    let link1_t90 = link1_cos * link2_dp_rx;
+                    let link1_t91 = link1_sin * link1_d_ry;
                     let link1_t92 = link1_t90 - link1_t91;
-                    let link1_t93 = row_0 * link2_dp_rx;
-                    let link1_t94 = row_1 * link1_d_ry;
+                    let link1_t93 = link1_sin * link2_dp_rx;
+                    let link1_t94 = link1_cos * link1_d_ry;
                     let link1_t95 = link1_t93 + link1_t94;
-                    let p_1 = p.get(1 + 2 * k, l);
+                    let p_1 = given[1][l];
                     let link1_t96 = p_1 - link1_d_rz;
                     let link1_e = link1_rho * link1_t96;
                     let link1_t97 = link1_minus_u_x * link1_e;
@@ -2151,6 +2152,10 @@ impl Chain100 {
                     results[36][l] = link1_minus_k_rx;
                     results[37][l] = link1_minus_k_ry;
                     results[38][l] = link1_e;
+                    results[39][l] = link1_sin;
+                    results[40][l] = link1_cos;
+                    results[41][l] = link2_sin;
+                    results[42][l] = link2_cos;
                 }
                 carried0 = results[0];
                 carried1 = results[1];
@@ -2179,23 +2184,14 @@ impl Chain100 {
                 carried24 = results[24];
                 carried25 = results[25];
                 carried26 = results[26];
-                row[4] = results[27];
-                row[5] = results[28];
-                row[6] = results[29];
-                row[7] = results[30];
-                row[8] = results[31];
-                row[9] = results[32];
-                row[10] = results[33];
-                row[11] = results[34];
-                row[12] = results[35];
-                row[13] = results[36];
-                row[14] = results[37];
-                row[15] = results[38];
+                rows1.push([results[27], results[28], results[29], results[30], results[31], results[32], results[33], results[34], results[35], results[36], results[37], results[38], results[39], results[40], results[41], results[42]]);
             }
             kept[17] = carried20;
             kept[18] = carried26;
         }
         {
+            let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+            for l in 0..LANES { given[0][l] = p.get(0, l); }
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
             for l in 0..LANES {
                 let kept_17 = kept[17][l];
@@ -2203,7 +2199,7 @@ impl Chain100 {
                 let link1_m_rz_rz = kept_17 + 0.003558400000000002;
                 // link1: U, Mj, k and the reduced inertia M' (4.44)
                 let link1_rho = 1.0 / link1_m_rz_rz;
-                let p_0 = p.get(0, l);
+                let p_0 = given[0][l];
                 let kept_18 = kept[18][l];
                 // link1: bias momentum D, D' (4.45, 4.49)
                 let link1_t0 = p_0 + kept_18;
@@ -2223,27 +2219,27 @@ impl Chain100 {
             let mut carried5 = [0.0; LANES];
             for l in 0..LANES { carried5[l] = kept[16][l]; }
             for k in 0..49 {
-                let row = &mut rows0[k];
+                let row1 = rows1.row(48 - k);
                 let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
                 for l in 0..LANES {
                     let carried_5 = carried5[l];
                     let link1_minus_hat_z = 0.03 * carried_5;
-                    let row_14 = row[14][l];
+                    let row_14 = row1[10][l];
                     let link1_t0 = row_14 * carried_5;
-                    let row_0 = row[0][l];
+                    let row_0 = row1[12][l];
                     let link1_omega_rx = row_0 * carried_5;
-                    let row_1 = row[1][l];
+                    let row_1 = row1[13][l];
                     let link1_omega_ry = row_1 * carried_5;
                     let carried_1 = carried1[l];
                     let link1_minus_hat_z_2 = carried_1 + link1_minus_hat_z;
                     let carried_4 = carried4[l];
                     let link1_t1 = 0.03 * carried_4;
-                    let row_10 = row[10][l];
+                    let row_10 = row1[6][l];
                     let carried_0 = carried0[l];
                     let link1_t2 = row_10 * carried_0;
-                    let row_12 = row[12][l];
+                    let row_12 = row1[8][l];
                     let link1_t3 = row_12 * link1_minus_hat_z_2;
-                    let row_13 = row[13][l];
+                    let row_13 = row1[9][l];
                     let carried_3 = carried3[l];
                     let link1_t4 = row_13 * carried_3;
                     let link1_t5 = link1_t0 + link1_t4;
@@ -2255,24 +2251,24 @@ impl Chain100 {
                     let link1_omega_ry_2 = link1_omega_ry - link1_t9;
                     let link2_t0 = 0.03 * link1_omega_ry_2;
                     let link2_hat_y = link1_minus_hat_z_2 + link2_t0;
-                    let row_6 = row[6][l];
+                    let row_6 = row1[2][l];
                     let link2_t1 = row_6 * link2_hat_y;
-                    let row_7 = row[7][l];
+                    let row_7 = row1[3][l];
                     let link2_t2 = row_7 * link1_omega_rx_2;
-                    let row_2 = row[2][l];
+                    let row_2 = row1[14][l];
                     let link2_t3 = row_2 * link2_hat_y;
-                    let row_3 = row[3][l];
+                    let row_3 = row1[15][l];
                     let link2_t4 = row_3 * link2_hat_y;
                     let link2_t5 = row_3 * link1_omega_rx_2;
                     let link2_t6 = row_2 * link1_omega_rx_2;
                     let carried_2 = carried2[l];
                     let link1_hat_y = carried_2 + link1_t1;
-                    let row_11 = row[11][l];
+                    let row_11 = row1[7][l];
                     let link1_t10 = row_11 * link1_hat_y;
                     let link1_t11 = link1_t2 + link1_t10;
                     let link1_t12 = link1_t3 + link1_t11;
                     let link1_t13 = link1_t5 + link1_t12;
-                    let row_15 = row[15][l];
+                    let row_15 = row1[11][l];
                     let link1_omega_rz = row_15 + link1_t13;
                     let link1_v = link1_omega_rz - carried_4;
                     let link1_t14 = row_0 * link1_hat_y;
@@ -2281,17 +2277,17 @@ impl Chain100 {
                     let link1_minus_omega_y = link1_t7 - link1_t15;
                     let link2_t7 = 0.03 * link1_omega_rz;
                     let link2_minus_hat_z = link1_minus_omega_y - link2_t7;
-                    let row_5 = row[5][l];
+                    let row_5 = row1[1][l];
                     let link2_t8 = row_5 * link1_omega_x;
                     let link2_t9 = link2_t1 + link2_t8;
-                    let row_4 = row[4][l];
+                    let row_4 = row1[0][l];
                     let link2_t10 = row_4 * link2_minus_hat_z;
                     let link2_t11 = link2_t9 + link2_t10;
-                    let row_8 = row[8][l];
+                    let row_8 = row1[4][l];
                     let link2_t12 = row_8 * link1_omega_rz;
                     let link2_t13 = link2_t2 - link2_t12;
                     let link2_t14 = link2_t11 - link2_t13;
-                    let row_9 = row[9][l];
+                    let row_9 = row1[5][l];
                     let link2_omega_rz = row_9 + link2_t14;
                     let link2_v = link2_omega_rz - link1_omega_ry_2;
                     let link2_t15 = row_3 * link1_omega_x;
@@ -2409,33 +2405,34 @@ impl Chain100 {
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut kept = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 15]);
-        let mut rows0 = [[[0.0; LANES]; 14]; 49];
-        {
-            let mut angles0 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
-            let mut angles1 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
+        let mut rows1 = ::multibody::runtime::kernel::PushedRows::<f64, LANES, 14, 49>::new();
+        let (sines1, cosines1) = if LANES == 1 {
+            let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 98]);
             for k in 0..49 {
+                let table = &Self::MOMENTA_TABLE0[k];
                 for l in 0..LANES {
                     let q_1 = q.get(1 + 2 * k, l);
                     let q_2 = q.get(2 + 2 * k, l);
-                    angles0[k][l] = q_1;
-                    angles1[k][l] = q_2;
+                    angles[2 * k + 0][l] = q_1;
+                    angles[2 * k + 1][l] = q_2;
                 }
             }
-            let (sines0, cosines0) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 49>(&angles0);
-            let (sines1, cosines1) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 49>(&angles1);
-            for k in 0..49 {
-                rows0[k][0] = sines0[k];
-                rows0[k][1] = cosines0[k];
-                rows0[k][2] = sines1[k];
-                rows0[k][3] = cosines1[k];
-            }
-        }
+            ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 98>(&angles)
+        } else { ([[0.0; LANES]; 98], [[0.0; LANES]; 98]) };
         {
+            let (sines, cosines) = {
+                let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+                for l in 0..LANES {
+                    let q_99 = q.get(99, l);
+                    angles[0][l] = q_99;
+                }
+                ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles)
+            };
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
             for l in 0..LANES {
-                let q_99 = q.get(99, l);
                 // link100: sine and cosine, rotation
-                let (link100_sin, link100_cos) = ::multibody::runtime::trig::pair_f64::<::multibody::runtime::kernel::Plain>(q_99);
+                let link100_sin = sines[0][l];
+                let link100_cos = cosines[0][l];
                 results[0][l] = link100_sin;
                 results[1][l] = link100_cos;
             }
@@ -2451,55 +2448,67 @@ impl Chain100 {
             let mut carried5 = [0.0; LANES];
             for l in 0..LANES { carried5[l] = v.get(0, l); }
             for k in 0..49 {
-                let row = &mut rows0[k];
                 let table = &Self::MOMENTA_TABLE0[k];
-                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 16]);
+                let (sines, cosines) = if LANES == 1 { ([sines1[2 * k + 0], sines1[2 * k + 1]], [cosines1[2 * k + 0], cosines1[2 * k + 1]]) } else {
+                    let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+                    for l in 0..LANES {
+                        let q_1 = q.get(1 + 2 * k, l);
+                        let q_2 = q.get(2 + 2 * k, l);
+                        angles[0][l] = q_1;
+                        angles[1][l] = q_2;
+                    }
+                    ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles)
+                };
+                let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+                for l in 0..LANES { given[0][l] = v.get(2 + 2 * k, l); }
+                for l in 0..LANES { given[1][l] = v.get(1 + 2 * k, l); }
+                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 20]);
                 for l in 0..LANES {
                     let carried_5 = carried5[l];
                     let link1_minus_hat_z = 0.03 * carried_5;
-                    let row_0 = row[0][l];
-                    let link1_hat_rx = carried_5 * row_0;
-                    let row_1 = row[1][l];
-                    let link1_hat_ry = carried_5 * row_1;
+                    let link1_sin = sines[0][l];
+                    let link1_hat_rx = carried_5 * link1_sin;
+                    let link1_cos = cosines[0][l];
+                    let link1_hat_ry = carried_5 * link1_cos;
                     let carried_1 = carried1[l];
                     let link1_minus_hat_z_2 = carried_1 + link1_minus_hat_z;
                     let carried_4 = carried4[l];
                     let link1_t0 = 0.03 * carried_4;
                     let carried_0 = carried0[l];
-                    let link1_t1 = carried_0 * row_1;
-                    let link1_t2 = carried_0 * row_0;
+                    let link1_t1 = carried_0 * link1_cos;
+                    let link1_t2 = carried_0 * link1_sin;
                     let carried_3 = carried3[l];
-                    let link1_t3 = carried_3 * row_1;
+                    let link1_t3 = carried_3 * link1_cos;
                     let link1_hat_rx_2 = link1_hat_rx + link1_t3;
-                    let link1_t4 = carried_3 * row_0;
+                    let link1_t4 = carried_3 * link1_sin;
                     let link1_hat_ry_2 = link1_hat_ry - link1_t4;
                     let link2_t0 = 0.03 * link1_hat_ry_2;
                     let link2_t1 = link1_minus_hat_z_2 + link2_t0;
-                    let row_2 = row[2][l];
-                    let link2_t2 = row_2 * link2_t1;
-                    let row_3 = row[3][l];
-                    let link2_t3 = row_3 * link2_t1;
-                    let link2_t4 = row_3 * link1_hat_rx_2;
-                    let link2_t5 = row_2 * link1_hat_rx_2;
-                    let v_2 = v.get(2 + 2 * k, l);
+                    let link2_sin = sines[1][l];
+                    let link2_t2 = link2_sin * link2_t1;
+                    let link2_cos = cosines[1][l];
+                    let link2_t3 = link2_cos * link2_t1;
+                    let link2_t4 = link2_cos * link1_hat_rx_2;
+                    let link2_t5 = link2_sin * link1_hat_rx_2;
+                    let v_2 = given[0][l];
                     let link2_omega_rz = v_2 + link1_hat_ry_2;
                     let carried_2 = carried2[l];
                     let link1_t5 = carried_2 + link1_t0;
-                    let link1_t6 = row_0 * link1_t5;
+                    let link1_t6 = link1_sin * link1_t5;
                     let link1_hat_x = link1_t1 + link1_t6;
-                    let link1_t7 = row_1 * link1_t5;
+                    let link1_t7 = link1_cos * link1_t5;
                     let link1_minus_hat_y = link1_t2 - link1_t7;
-                    let v_1 = v.get(1 + 2 * k, l);
+                    let v_1 = given[1][l];
                     let link1_omega_rz = v_1 + carried_4;
                     let link2_t6 = 0.03 * link1_omega_rz;
                     let link2_minus_hat_z = link1_minus_hat_y - link2_t6;
-                    let link2_t7 = row_3 * link1_hat_x;
+                    let link2_t7 = link2_cos * link1_hat_x;
                     let link2_hat_x = link2_t2 + link2_t7;
-                    let link2_t8 = row_2 * link1_hat_x;
+                    let link2_t8 = link2_sin * link1_hat_x;
                     let link2_hat_y = link2_t3 - link2_t8;
-                    let link2_t9 = row_2 * link1_omega_rz;
+                    let link2_t9 = link2_sin * link1_omega_rz;
                     let link2_hat_rx = link2_t4 - link2_t9;
-                    let link2_t10 = row_3 * link1_omega_rz;
+                    let link2_t10 = link2_cos * link1_omega_rz;
                     let link2_minus_hat_ry = link2_t5 + link2_t10;
                     let table_1 = table[1];
                     let link1_t8 = table_1 * link1_hat_rx_2;
@@ -2537,6 +2546,10 @@ impl Chain100 {
                     results[13][l] = link2_t14;
                     results[14][l] = link2_t15;
                     results[15][l] = link2_t17;
+                    results[16][l] = link1_sin;
+                    results[17][l] = link1_cos;
+                    results[18][l] = link2_sin;
+                    results[19][l] = link2_cos;
                 }
                 carried0 = results[0];
                 carried1 = results[1];
@@ -2544,16 +2557,7 @@ impl Chain100 {
                 carried3 = results[3];
                 carried4 = results[4];
                 carried5 = results[5];
-                row[4] = results[6];
-                row[5] = results[7];
-                row[6] = results[8];
-                row[7] = results[9];
-                row[8] = results[10];
-                row[9] = results[11];
-                row[10] = results[12];
-                row[11] = results[13];
-                row[12] = results[14];
-                row[13] = results[15];
+                rows1.push([results[6], results[7], results[8], results[9], results[10], results[11], results[12], results[13], results[14], results[15], results[16], results[17], results[18], results[19]]);
             }
             kept[2] = carried0;
             kept[3] = carried1;
@@ -2563,6 +2567,9 @@ impl Chain100 {
             kept[7] = carried5;
         }
         {
+            let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+            for l in 0..LANES { given[0][l] = v.get(99, l); }
+            for l in 0..LANES { given[1][l] = v.get(0, l); }
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
             for l in 0..LANES {
                 let kept_7 = kept[7][l];
@@ -2587,9 +2594,9 @@ impl Chain100 {
                 let link100_t7 = kept_1 * kept_7;
                 let link100_t8 = kept_0 * kept_5;
                 let link100_hat_ry = link100_t7 - link100_t8;
-                let v_99 = v.get(99, l);
+                let v_99 = given[0][l];
                 let link100_omega_rz = v_99 + kept_6;
-                let v_0 = v.get(0, l);
+                let v_0 = given[1][l];
                 // link1: momentum
                 let link1_t0 = 0.003558400000000002 * v_0;
                 // link100: momentum
@@ -2644,25 +2651,25 @@ impl Chain100 {
             let mut carried5 = [0.0; LANES];
             for l in 0..LANES { carried5[l] = -kept[14][l]; }
             for k in (0..49).rev() {
-                let row = &mut rows0[k];
+                let row1 = rows1.row(k);
                 let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
                 for l in 0..LANES {
                     let carried_1 = carried1[l];
-                    let row_10 = row[10][l];
+                    let row_10 = row1[6][l];
                     let link2_p_y = carried_1 + row_10;
                     let carried_2 = carried2[l];
-                    let row_11 = row[11][l];
+                    let row_11 = row1[7][l];
                     let link2_p_z = carried_2 + row_11;
                     let carried_3 = carried3[l];
-                    let row_9 = row[9][l];
+                    let row_9 = row1[5][l];
                     let link2_p_rx = carried_3 + row_9;
                     let carried_5 = carried5[l];
-                    let row_13 = row[13][l];
+                    let row_13 = row1[9][l];
                     let link2_p_rz = carried_5 + row_13;
-                    let row_3 = row[3][l];
+                    let row_3 = row1[13][l];
                     let carried_0 = carried0[l];
                     let link2_t0 = row_3 * carried_0;
-                    let row_2 = row[2][l];
+                    let row_2 = row1[12][l];
                     let link2_t1 = row_2 * link2_p_y;
                     let link1_p_x = link2_t0 - link2_t1;
                     let link2_t2 = row_2 * carried_0;
@@ -2673,15 +2680,15 @@ impl Chain100 {
                     let link2_t7 = 0.03 * link2_t4;
                     let link2_t8 = link2_p_rz + link2_t7;
                     let link2_t9 = 0.03 * link2_p_z;
-                    let row_5 = row[5][l];
+                    let row_5 = row1[1][l];
                     let link1_p_y = row_5 + link2_p_z;
-                    let row_6 = row[6][l];
+                    let row_6 = row1[2][l];
                     let link1_minus_p_z = row_6 + link2_t4;
-                    let row_7 = row[7][l];
+                    let row_7 = row1[3][l];
                     let link1_p_ry = row_7 + link2_t8;
-                    let row_1 = row[1][l];
+                    let row_1 = row1[11][l];
                     let link1_t0 = row_1 * link1_p_x;
-                    let row_0 = row[0][l];
+                    let row_0 = row1[10][l];
                     let link1_t1 = row_0 * link1_p_y;
                     let link1_t2 = link1_t0 - link1_t1;
                     let link1_t3 = row_0 * link1_p_x;
@@ -2692,16 +2699,16 @@ impl Chain100 {
                     let link1_t8 = 0.03 * link1_t5;
                     let link1_t9 = 0.03 * link1_minus_p_z;
                     let carried_4 = carried4[l];
-                    let row_12 = row[12][l];
+                    let row_12 = row1[8][l];
                     let link2_minus_p_ry = carried_4 - row_12;
                     let link2_t10 = row_2 * link2_minus_p_ry;
                     let link2_t11 = link2_t5 + link2_t10;
                     let link2_t12 = row_3 * link2_minus_p_ry;
                     let link2_t13 = link2_t6 - link2_t12;
                     let link2_t14 = link2_t9 - link2_t13;
-                    let row_4 = row[4][l];
+                    let row_4 = row1[0][l];
                     let link1_p_rx = row_4 + link2_t11;
-                    let row_8 = row[8][l];
+                    let row_8 = row1[4][l];
                     let link1_p_rz = row_8 + link2_t14;
                     let link1_t10 = row_1 * link1_p_rx;
                     let link1_t11 = link1_t10 - link1_t6;
@@ -2806,36 +2813,41 @@ impl Chain100 {
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), energy: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut kept = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 23]);
-        let mut rows0 = [[[0.0; LANES]; 16]; 49];
-        {
-            let mut angles0 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
-            let mut angles1 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 49]);
+        let mut rows1 = ::multibody::runtime::kernel::PushedRows::<f64, LANES, 16, 49>::new();
+        let (sines1, cosines1) = if LANES == 1 {
+            let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 98]);
             for k in 0..49 {
+                let table = &Self::ENERGY_TABLE0[k];
                 for l in 0..LANES {
                     let q_1 = q.get(1 + 2 * k, l);
                     let q_2 = q.get(2 + 2 * k, l);
-                    angles0[k][l] = q_1;
-                    angles1[k][l] = q_2;
+                    angles[2 * k + 0][l] = q_1;
+                    angles[2 * k + 1][l] = q_2;
                 }
             }
-            let (sines0, cosines0) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 49>(&angles0);
-            let (sines1, cosines1) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 49>(&angles1);
-            for k in 0..49 {
-                rows0[k][0] = sines0[k];
-                rows0[k][1] = cosines0[k];
-                rows0[k][2] = sines1[k];
-                rows0[k][3] = cosines1[k];
-            }
-        }
+            ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 98>(&angles)
+        } else { ([[0.0; LANES]; 98], [[0.0; LANES]; 98]) };
         {
+            let (sines, cosines) = {
+                let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+                for l in 0..LANES {
+                    let q_0 = q.get(0, l);
+                    let q_99 = q.get(99, l);
+                    angles[0][l] = q_0;
+                    angles[1][l] = q_99;
+                }
+                ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles)
+            };
+            let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+            for l in 0..LANES { given[0][l] = p.get(99, l); }
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 19]);
             for l in 0..LANES {
-                let q_0 = q.get(0, l);
                 // link1: sine and cosine, rotation
-                let (link1_sin, link1_cos) = ::multibody::runtime::trig::pair_f64::<::multibody::runtime::kernel::Plain>(q_0);
-                let q_99 = q.get(99, l);
+                let link1_sin = sines[0][l];
+                let link1_cos = cosines[0][l];
                 // link100: sine and cosine, rotation
-                let (link100_sin, link100_cos) = ::multibody::runtime::trig::pair_f64::<::multibody::runtime::kernel::Plain>(q_99);
+                let link100_sin = sines[1][l];
+                let link100_cos = cosines[1][l];
                 // link100: inertia carried to the parent, M* (4.48)
                 let link100_minus_u_x = 0.0003 * link100_sin;
                 let link100_u_y = 0.0003 * link100_cos;
@@ -2858,7 +2870,7 @@ impl Chain100 {
                 let link100_t6 = link100_u_y + link100_u_y;
                 let link100_t7 = 0.03 * link100_t6;
                 let link100_t8 = link100_minus_mp_ry_ry - link100_t7;
-                let p_99 = p.get(99, l);
+                let p_99 = given[0][l];
                 // link100: bias momentum D, D' (4.45, 4.49)
                 let link100_e = 151515.15151515152 * p_99;
                 let link100_minus_dp_x = link100_minus_u_x * link100_e;
@@ -2953,9 +2965,21 @@ impl Chain100 {
             let mut carried29 = [0.0; LANES];
             for l in 0..LANES { carried29[l] = kept[2][l]; }
             for k in (0..49).rev() {
-                let row = &mut rows0[k];
                 let table = &Self::ENERGY_TABLE0[k];
-                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 42]);
+                let (sines, cosines) = if LANES == 1 { ([sines1[2 * k + 0], sines1[2 * k + 1]], [cosines1[2 * k + 0], cosines1[2 * k + 1]]) } else {
+                    let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+                    for l in 0..LANES {
+                        let q_1 = q.get(1 + 2 * k, l);
+                        let q_2 = q.get(2 + 2 * k, l);
+                        angles[0][l] = q_1;
+                        angles[1][l] = q_2;
+                    }
+                    ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles)
+                };
+                let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+                for l in 0..LANES { given[0][l] = p.get(2 + 2 * k, l); }
+                for l in 0..LANES { given[1][l] = p.get(1 + 2 * k, l); }
+                let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 46]);
                 for l in 0..LANES {
                     let table_4 = table[4];
                     let carried_15 = carried15[l];
@@ -2963,75 +2987,75 @@ impl Chain100 {
                     let table_5 = table[5];
                     let carried_20 = carried20[l];
                     let link2_m_rz_rz = table_5 + carried_20;
-                    let row_3 = row[3][l];
-                    let link2_t0 = row_3 + row_3;
+                    let link2_cos = cosines[1][l];
+                    let link2_t0 = link2_cos + link2_cos;
                     let carried_2 = carried2[l];
-                    let link2_mp_xz = carried_2 * row_3;
-                    let row_2 = row[2][l];
-                    let link2_mp_yz = carried_2 * row_2;
+                    let link2_mp_xz = carried_2 * link2_cos;
+                    let link2_sin = sines[1][l];
+                    let link2_mp_yz = carried_2 * link2_sin;
                     let carried_18 = carried18[l];
                     let link2_t1 = carried_18 - link2_m_rx_rx;
-                    let link2_t2 = row_2 * link2_t1;
+                    let link2_t2 = link2_sin * link2_t1;
                     let carried_17 = carried17[l];
-                    let link2_u_rx = carried_17 * row_3;
-                    let link2_u_ry = carried_17 * row_2;
+                    let link2_u_rx = carried_17 * link2_cos;
+                    let link2_u_ry = carried_17 * link2_sin;
                     let link2_rho = 1.0 / link2_m_rz_rz;
                     let carried_21 = carried21[l];
-                    let link2_t3 = carried_21 * row_3;
-                    let link2_t4 = carried_21 * row_2;
+                    let link2_t3 = carried_21 * link2_cos;
+                    let link2_t4 = carried_21 * link2_sin;
                     let carried_25 = carried25[l];
-                    let link2_t5 = carried_25 * row_2;
-                    let link2_t6 = carried_25 * row_3;
-                    let row_1 = row[1][l];
-                    let link1_t0 = row_1 + row_1;
+                    let link2_t5 = carried_25 * link2_sin;
+                    let link2_t6 = carried_25 * link2_cos;
+                    let link1_cos = cosines[0][l];
+                    let link1_t0 = link1_cos + link1_cos;
                     let carried_29 = carried29[l];
-                    let row_0 = row[0][l];
-                    let link1_t1 = carried_29 * row_0;
-                    let link1_t2 = carried_29 * row_1;
+                    let link1_sin = sines[0][l];
+                    let link1_t1 = carried_29 * link1_sin;
+                    let link1_t2 = carried_29 * link1_cos;
                     let carried_0 = carried0[l];
                     let carried_3 = carried3[l];
                     let link2_t7 = carried_0 - carried_3;
-                    let link2_t8 = row_2 * link2_t7;
+                    let link2_t8 = link2_sin * link2_t7;
                     let carried_1 = carried1[l];
                     let link2_t9 = carried_1 * link2_t0;
                     let carried_4 = carried4[l];
-                    let link2_t10 = carried_4 * row_2;
+                    let link2_t10 = carried_4 * link2_sin;
                     let link2_t11 = link2_mp_xz - link2_t10;
-                    let link2_t12 = carried_4 * row_3;
+                    let link2_t12 = carried_4 * link2_cos;
                     let link2_t13 = link2_mp_yz + link2_t12;
                     let carried_6 = carried6[l];
                     let carried_10 = carried10[l];
                     let link2_t14 = carried_6 - carried_10;
-                    let link2_t15 = row_2 * link2_t14;
+                    let link2_t15 = link2_sin * link2_t14;
                     let carried_8 = carried8[l];
-                    let link2_t16 = carried_8 * row_3;
-                    let link2_t17 = carried_8 * row_2;
+                    let link2_t16 = carried_8 * link2_cos;
+                    let link2_t17 = carried_8 * link2_sin;
                     let carried_12 = carried12[l];
-                    let link2_t18 = carried_12 * row_3;
-                    let link2_t19 = carried_12 * row_2;
+                    let link2_t18 = carried_12 * link2_cos;
+                    let link2_t19 = carried_12 * link2_sin;
                     let carried_16 = carried16[l];
                     let link2_t20 = carried_16 * link2_t0;
                     let carried_19 = carried19[l];
-                    let link2_t21 = carried_19 * row_2;
-                    let link2_t22 = carried_19 * row_3;
+                    let link2_t21 = carried_19 * link2_sin;
+                    let link2_t22 = carried_19 * link2_cos;
                     let carried_14 = carried14[l];
                     let link2_k_z = carried_14 * link2_rho;
                     let link2_t23 = carried_14 * link2_k_z;
                     let carried_5 = carried5[l];
                     let link2_mp_zz = carried_5 - link2_t23;
                     let carried_22 = carried22[l];
-                    let link2_t24 = carried_22 * row_2;
+                    let link2_t24 = carried_22 * link2_sin;
                     let link2_t25 = link2_t3 - link2_t24;
-                    let link2_t26 = carried_22 * row_3;
+                    let link2_t26 = carried_22 * link2_cos;
                     let link2_t27 = link2_t4 + link2_t26;
                     let carried_24 = carried24[l];
-                    let link2_t28 = carried_24 * row_3;
+                    let link2_t28 = carried_24 * link2_cos;
                     let link2_t29 = link2_t5 - link2_t28;
-                    let link2_t30 = carried_24 * row_2;
+                    let link2_t30 = carried_24 * link2_sin;
                     let link2_t31 = link2_t6 + link2_t30;
                     let carried_28 = carried28[l];
-                    let link2_t32 = carried_28 * row_2;
-                    let link2_t33 = carried_28 * row_3;
+                    let link2_t32 = carried_28 * link2_sin;
+                    let link2_t33 = carried_28 * link2_cos;
                     let table_3 = table[3];
                     let carried_11 = carried11[l];
                     let link2_minus_m_ry_z = table_3 + carried_11;
@@ -3040,33 +3064,33 @@ impl Chain100 {
                     let carried_27 = carried27[l];
                     let link2_s_x = table_3 - carried_27;
                     let link2_t34 = link2_t8 - link2_t9;
-                    let link2_t35 = row_2 * link2_t34;
-                    let link2_t36 = row_3 * link2_t34;
+                    let link2_t35 = link2_sin * link2_t34;
+                    let link2_t36 = link2_cos * link2_t34;
                     let link2_t37 = carried_1 + link2_t36;
                     let link2_t38 = carried_0 - link2_t35;
                     let link2_t39 = carried_3 + link2_t35;
                     let carried_7 = carried7[l];
                     let carried_9 = carried9[l];
                     let link2_t40 = carried_7 - carried_9;
-                    let link2_t41 = row_3 * link2_t40;
+                    let link2_t41 = link2_cos * link2_t40;
                     let link2_t42 = link2_t15 - link2_t41;
-                    let link2_t43 = row_2 * link2_t42;
-                    let link2_t44 = row_3 * link2_t42;
+                    let link2_t43 = link2_sin * link2_t42;
+                    let link2_t44 = link2_cos * link2_t42;
                     let link2_t45 = carried_9 - link2_t44;
                     let link2_t46 = carried_7 + link2_t44;
                     let link2_t47 = carried_6 - link2_t43;
                     let link2_t48 = carried_10 + link2_t43;
-                    let link2_t49 = row_2 * link2_minus_m_ry_z;
+                    let link2_t49 = link2_sin * link2_minus_m_ry_z;
                     let link2_t50 = link2_t16 + link2_t49;
-                    let link2_t51 = row_3 * link2_minus_m_ry_z;
+                    let link2_t51 = link2_cos * link2_minus_m_ry_z;
                     let link2_t52 = link2_t17 - link2_t51;
-                    let link2_t53 = row_2 * link2_m_rz_y;
+                    let link2_t53 = link2_sin * link2_m_rz_y;
                     let link2_minus_u_x = link2_t18 + link2_t53;
-                    let link2_t54 = row_3 * link2_m_rz_y;
+                    let link2_t54 = link2_cos * link2_m_rz_y;
                     let link2_minus_u_y = link2_t19 - link2_t54;
                     let link2_t55 = link2_t2 + link2_t20;
-                    let link2_t56 = row_2 * link2_t55;
-                    let link2_t57 = row_3 * link2_t55;
+                    let link2_t56 = link2_sin * link2_t55;
+                    let link2_t57 = link2_cos * link2_t55;
                     let link2_t58 = carried_16 - link2_t57;
                     let link2_t59 = link2_m_rx_rx + link2_t56;
                     let link2_t60 = carried_18 - link2_t56;
@@ -3130,7 +3154,7 @@ impl Chain100 {
                     let link1_m_rx_rx = table_1 + link2_mp_rx_rx;
                     let table_2 = table[2];
                     let link1_m_rz_rz = table_2 + link2_t83;
-                    let p_2 = p.get(2 + 2 * k, l);
+                    let p_2 = given[0][l];
                     let carried_26 = carried26[l];
                     let link2_t84 = p_2 + carried_26;
                     let link2_e = link2_rho * link2_t84;
@@ -3149,63 +3173,63 @@ impl Chain100 {
                     let link1_d_ry = p_2 + link2_t90;
                     let link2_t91 = 0.03 * link2_dp_z;
                     let link1_d_rz = link2_minus_dp_ry + link2_t91;
-                    let link2_t92 = row_3 * link2_s_x;
+                    let link2_t92 = link2_cos * link2_s_x;
                     let link2_t93 = link2_t32 - link2_t92;
-                    let link2_t94 = row_2 * link2_s_x;
+                    let link2_t94 = link2_sin * link2_s_x;
                     let link1_minus_s_z = link2_t33 + link2_t94;
                     let link1_s_x = table_0 - link2_t93;
                     let link1_t3 = link2_mp_xx - link1_m_yy;
-                    let link1_t4 = row_0 * link1_t3;
+                    let link1_t4 = link1_sin * link1_t3;
                     let link1_t5 = link1_t0 * link2_minus_mp_xz;
                     let link1_t6 = link1_t4 - link1_t5;
-                    let link1_t7 = row_0 * link1_t6;
-                    let link1_t8 = row_1 * link1_t6;
+                    let link1_t7 = link1_sin * link1_t6;
+                    let link1_t8 = link1_cos * link1_t6;
                     let link1_t9 = link2_minus_mp_xz + link1_t8;
                     let link1_t10 = link2_mp_xx - link1_t7;
                     let link1_t11 = link1_m_yy + link1_t7;
-                    let link1_t12 = row_1 * link2_mp_xy;
-                    let link1_t13 = row_0 * link2_minus_mp_yz;
+                    let link1_t12 = link1_cos * link2_mp_xy;
+                    let link1_t13 = link1_sin * link2_minus_mp_yz;
                     let link1_t14 = link1_t12 + link1_t13;
-                    let link1_t15 = row_0 * link2_mp_xy;
-                    let link1_t16 = row_1 * link2_minus_mp_yz;
+                    let link1_t15 = link1_sin * link2_mp_xy;
+                    let link1_t16 = link1_cos * link2_minus_mp_yz;
                     let link1_t17 = link1_t15 - link1_t16;
                     let link1_t18 = link2_mp_rx_x + link1_minus_m_ry_y;
-                    let link1_t19 = row_0 * link1_t18;
+                    let link1_t19 = link1_sin * link1_t18;
                     let link1_t20 = link2_mp_rx_z + link1_m_ry_x;
-                    let link1_t21 = row_1 * link1_t20;
+                    let link1_t21 = link1_cos * link1_t20;
                     let link1_t22 = link1_t19 + link1_t21;
-                    let link1_t23 = row_0 * link1_t22;
-                    let link1_t24 = row_1 * link1_t22;
+                    let link1_t23 = link1_sin * link1_t22;
+                    let link1_t24 = link1_cos * link1_t22;
                     let link1_t25 = link1_m_ry_x - link1_t24;
                     let link1_t26 = link2_mp_rx_z - link1_t24;
                     let link1_t27 = link2_mp_rx_x - link1_t23;
                     let link1_t28 = link1_minus_m_ry_y - link1_t23;
-                    let link1_t29 = row_1 * link2_minus_mp_rx_y;
-                    let link1_t30 = row_0 * link1_minus_m_ry_z;
+                    let link1_t29 = link1_cos * link2_minus_mp_rx_y;
+                    let link1_t30 = link1_sin * link1_minus_m_ry_z;
                     let link1_t31 = link1_t29 + link1_t30;
-                    let link1_t32 = row_0 * link2_minus_mp_rx_y;
-                    let link1_t33 = row_1 * link1_minus_m_ry_z;
+                    let link1_t32 = link1_sin * link2_minus_mp_rx_y;
+                    let link1_t33 = link1_cos * link1_minus_m_ry_z;
                     let link1_t34 = link1_t32 - link1_t33;
-                    let link1_t35 = row_1 * link1_minus_m_rz_x;
-                    let link1_t36 = row_0 * link1_m_rz_y;
+                    let link1_t35 = link1_cos * link1_minus_m_rz_x;
+                    let link1_t36 = link1_sin * link1_m_rz_y;
                     let link1_minus_u_x = link1_t35 + link1_t36;
-                    let link1_t37 = row_0 * link1_minus_m_rz_x;
-                    let link1_t38 = row_1 * link1_m_rz_y;
+                    let link1_t37 = link1_sin * link1_minus_m_rz_x;
+                    let link1_t38 = link1_cos * link1_m_rz_y;
                     let link1_minus_u_y = link1_t37 - link1_t38;
                     let link1_t39 = link1_m_ry_ry - link1_m_rx_rx;
-                    let link1_t40 = row_0 * link1_t39;
+                    let link1_t40 = link1_sin * link1_t39;
                     let link1_t41 = link1_t0 * link1_minus_m_rx_ry;
                     let link1_t42 = link1_t40 + link1_t41;
-                    let link1_t43 = row_0 * link1_t42;
-                    let link1_t44 = row_1 * link1_t42;
+                    let link1_t43 = link1_sin * link1_t42;
+                    let link1_t44 = link1_cos * link1_t42;
                     let link1_t45 = link1_minus_m_rx_ry - link1_t44;
                     let link1_t46 = link1_m_rx_rx + link1_t43;
                     let link1_t47 = link1_m_ry_ry - link1_t43;
-                    let link1_t48 = row_1 * link1_minus_m_rx_rz;
-                    let link1_t49 = row_0 * link1_minus_m_ry_rz;
+                    let link1_t48 = link1_cos * link1_minus_m_rx_rz;
+                    let link1_t49 = link1_sin * link1_minus_m_ry_rz;
                     let link1_minus_u_rx = link1_t48 - link1_t49;
-                    let link1_t50 = row_0 * link1_minus_m_rx_rz;
-                    let link1_t51 = row_1 * link1_minus_m_ry_rz;
+                    let link1_t50 = link1_sin * link1_minus_m_rx_rz;
+                    let link1_t51 = link1_cos * link1_minus_m_ry_rz;
                     let link1_minus_u_ry = link1_t50 + link1_t51;
                     let link1_rho = 1.0 / link1_m_rz_rz;
                     let link1_minus_k_x = link1_minus_u_x * link1_rho;
@@ -3262,19 +3286,19 @@ impl Chain100 {
                     let link1_t83 = 0.03 * link1_t82;
                     let link1_t84 = link1_mp_ry_ry - link1_t83;
                     let link1_t85 = 0.03 * link1_t77;
-                    let link1_t86 = row_1 * link2_dp_x;
-                    let link1_t87 = row_0 * link2_dp_z;
+                    let link1_t86 = link1_cos * link2_dp_x;
+                    let link1_t87 = link1_sin * link2_dp_z;
                     let link1_t88 = link1_t86 - link1_t87;
-                    let link1_t89 = row_0 * link2_dp_x;
-                    let link1_t90 = row_1 * link2_dp_z;
+                    let link1_t89 = link1_sin * link2_dp_x;
+                    let link1_t90 = link1_cos * link2_dp_z;
                     let link1_t91 = link1_t89 + link1_t90;
-                    let link1_t92 = row_1 * link2_dp_rx;
-                    let link1_t93 = row_0 * link1_d_ry;
+                    let link1_t92 = link1_cos * link2_dp_rx;
+                    let link1_t93 = link1_sin * link1_d_ry;
                     let link1_t94 = link1_t92 - link1_t93;
-                    let link1_t95 = row_0 * link2_dp_rx;
-                    let link1_t96 = row_1 * link1_d_ry;
+                    let link1_t95 = link1_sin * link2_dp_rx;
+                    let link1_t96 = link1_cos * link1_d_ry;
                     let link1_t97 = link1_t95 + link1_t96;
-                    let p_1 = p.get(1 + 2 * k, l);
+                    let p_1 = given[1][l];
                     let link1_t98 = p_1 - link1_d_rz;
                     let link1_e = link1_rho * link1_t98;
                     let link1_t99 = link1_minus_u_x * link1_e;
@@ -3291,9 +3315,9 @@ impl Chain100 {
                     let link1_t105 = p_1 + link1_t104;
                     let link1_t106 = 0.03 * link1_minus_dp_z;
                     let link1_t107 = link1_dp_ry + link1_t106;
-                    let link1_t108 = row_1 * link1_s_x;
+                    let link1_t108 = link1_cos * link1_s_x;
                     let link1_t109 = link1_t1 - link1_t108;
-                    let link1_t110 = row_0 * link1_s_x;
+                    let link1_t110 = link1_sin * link1_s_x;
                     let link1_t111 = link1_t2 + link1_t110;
                     results[0][l] = link1_mp_xx;
                     results[1][l] = -link1_minus_mp_xz;
@@ -3337,6 +3361,10 @@ impl Chain100 {
                     results[39][l] = link1_minus_k_rx;
                     results[40][l] = link1_minus_k_ry;
                     results[41][l] = link1_e;
+                    results[42][l] = link1_sin;
+                    results[43][l] = link1_cos;
+                    results[44][l] = link2_sin;
+                    results[45][l] = link2_cos;
                 }
                 carried0 = results[0];
                 carried1 = results[1];
@@ -3368,18 +3396,7 @@ impl Chain100 {
                 carried27 = results[27];
                 carried28 = results[28];
                 carried29 = results[29];
-                row[4] = results[30];
-                row[5] = results[31];
-                row[6] = results[32];
-                row[7] = results[33];
-                row[8] = results[34];
-                row[9] = results[35];
-                row[10] = results[36];
-                row[11] = results[37];
-                row[12] = results[38];
-                row[13] = results[39];
-                row[14] = results[40];
-                row[15] = results[41];
+                rows1.push([results[30], results[31], results[32], results[33], results[34], results[35], results[36], results[37], results[38], results[39], results[40], results[41], results[42], results[43], results[44], results[45]]);
             }
             kept[19] = carried20;
             kept[20] = carried26;
@@ -3387,6 +3404,8 @@ impl Chain100 {
             kept[22] = carried28;
         }
         {
+            let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+            for l in 0..LANES { given[0][l] = p.get(0, l); }
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 3]);
             for l in 0..LANES {
                 let kept_19 = kept[19][l];
@@ -3396,7 +3415,7 @@ impl Chain100 {
                 let link1_minus_s_x = kept_21 - 0.05970000000000004;
                 // link1: U, Mj, k and the reduced inertia M' (4.44)
                 let link1_rho = 1.0 / link1_m_rz_rz;
-                let p_0 = p.get(0, l);
+                let p_0 = given[0][l];
                 let kept_20 = kept[20][l];
                 // link1: bias momentum D, D' (4.45, 4.49)
                 let link1_t0 = p_0 + kept_20;
@@ -3433,27 +3452,30 @@ impl Chain100 {
             let mut carried7 = [0.0; LANES];
             for l in 0..LANES { carried7[l] = kept[17][l]; }
             for k in 0..49 {
-                let row = &mut rows0[k];
+                let row1 = rows1.row(48 - k);
+                let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+                for l in 0..LANES { given[0][l] = p.get(1 + 2 * k, l); }
+                for l in 0..LANES { given[1][l] = p.get(2 + 2 * k, l); }
                 let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
                 for l in 0..LANES {
                     let carried_5 = carried5[l];
                     let link1_minus_hat_z = 0.03 * carried_5;
-                    let row_14 = row[14][l];
+                    let row_14 = row1[10][l];
                     let link1_t0 = row_14 * carried_5;
-                    let row_0 = row[0][l];
+                    let row_0 = row1[12][l];
                     let link1_omega_rx = row_0 * carried_5;
-                    let row_1 = row[1][l];
+                    let row_1 = row1[13][l];
                     let link1_omega_ry = row_1 * carried_5;
                     let carried_1 = carried1[l];
                     let link1_minus_hat_z_2 = carried_1 + link1_minus_hat_z;
                     let carried_4 = carried4[l];
                     let link1_t1 = 0.03 * carried_4;
-                    let row_10 = row[10][l];
+                    let row_10 = row1[6][l];
                     let carried_0 = carried0[l];
                     let link1_t2 = row_10 * carried_0;
-                    let row_12 = row[12][l];
+                    let row_12 = row1[8][l];
                     let link1_t3 = row_12 * link1_minus_hat_z_2;
-                    let row_13 = row[13][l];
+                    let row_13 = row1[9][l];
                     let carried_3 = carried3[l];
                     let link1_t4 = row_13 * carried_3;
                     let link1_t5 = link1_t0 + link1_t4;
@@ -3465,47 +3487,47 @@ impl Chain100 {
                     let link1_omega_ry_2 = link1_omega_ry - link1_t9;
                     let link2_t0 = 0.03 * link1_omega_ry_2;
                     let link2_hat_y = link1_minus_hat_z_2 + link2_t0;
-                    let row_6 = row[6][l];
+                    let row_6 = row1[2][l];
                     let link2_t1 = row_6 * link2_hat_y;
-                    let row_7 = row[7][l];
+                    let row_7 = row1[3][l];
                     let link2_t2 = row_7 * link1_omega_rx_2;
-                    let row_2 = row[2][l];
+                    let row_2 = row1[14][l];
                     let link2_t3 = row_2 * link2_hat_y;
-                    let row_3 = row[3][l];
+                    let row_3 = row1[15][l];
                     let link2_t4 = row_3 * link2_hat_y;
                     let link2_t5 = row_3 * link1_omega_rx_2;
                     let link2_t6 = row_2 * link1_omega_rx_2;
                     let carried_2 = carried2[l];
                     let link1_hat_y = carried_2 + link1_t1;
-                    let row_11 = row[11][l];
+                    let row_11 = row1[7][l];
                     let link1_t10 = row_11 * link1_hat_y;
                     let link1_t11 = link1_t2 + link1_t10;
                     let link1_t12 = link1_t3 + link1_t11;
                     let link1_t13 = link1_t5 + link1_t12;
-                    let row_15 = row[15][l];
+                    let row_15 = row1[11][l];
                     let link1_omega_rz = row_15 + link1_t13;
                     let link1_minus_v = carried_4 - link1_omega_rz;
                     let link1_t14 = row_0 * link1_hat_y;
                     let link1_omega_x = link1_t6 + link1_t14;
                     let link1_t15 = row_1 * link1_hat_y;
                     let link1_minus_omega_y = link1_t7 - link1_t15;
-                    let p_1 = p.get(1 + 2 * k, l);
+                    let p_1 = given[0][l];
                     let link1_t16 = p_1 * link1_minus_v;
                     let carried_6 = carried6[l];
                     let link1_t17 = carried_6 - link1_t16;
                     let link2_t7 = 0.03 * link1_omega_rz;
                     let link2_minus_hat_z = link1_minus_omega_y - link2_t7;
-                    let row_5 = row[5][l];
+                    let row_5 = row1[1][l];
                     let link2_t8 = row_5 * link1_omega_x;
                     let link2_t9 = link2_t1 + link2_t8;
-                    let row_4 = row[4][l];
+                    let row_4 = row1[0][l];
                     let link2_t10 = row_4 * link2_minus_hat_z;
                     let link2_t11 = link2_t9 + link2_t10;
-                    let row_8 = row[8][l];
+                    let row_8 = row1[4][l];
                     let link2_t12 = row_8 * link1_omega_rz;
                     let link2_t13 = link2_t2 - link2_t12;
                     let link2_t14 = link2_t11 - link2_t13;
-                    let row_9 = row[9][l];
+                    let row_9 = row1[5][l];
                     let link2_omega_rz = row_9 + link2_t14;
                     let link2_minus_v = link1_omega_ry_2 - link2_omega_rz;
                     let link2_t15 = row_3 * link1_omega_x;
@@ -3516,7 +3538,7 @@ impl Chain100 {
                     let link2_omega_rx = link2_t5 - link2_t17;
                     let link2_t18 = row_3 * link1_omega_rz;
                     let link2_minus_omega_ry = link2_t6 + link2_t18;
-                    let p_2 = p.get(2 + 2 * k, l);
+                    let p_2 = given[1][l];
                     let link2_t19 = p_2 * link2_minus_v;
                     let link2_t20 = link1_t17 - link2_t19;
                     let carried_7 = carried7[l];
@@ -3545,6 +3567,8 @@ impl Chain100 {
             kept[1] = carried7;
         }
         {
+            let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+            for l in 0..LANES { given[0][l] = p.get(99, l); }
             let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
             for l in 0..LANES {
                 let kept_20 = kept[20][l];
@@ -3561,7 +3585,7 @@ impl Chain100 {
                 let kept_15 = kept[15][l];
                 let link100_omega_rz = kept_15 + link100_t3;
                 let link100_minus_v = kept_20 - link100_omega_rz;
-                let p_99 = p.get(99, l);
+                let p_99 = given[0][l];
                 // link100: energy
                 let link100_t4 = p_99 * link100_minus_v;
                 let kept_19 = kept[19][l];
@@ -4051,7 +4075,7 @@ impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::
 }
 
 /// `LANES` states of [`Chain100`] at once, side by side in vector registers. In every array the last index is the lane:
-/// `q[k][l]` is coordinate `k` of state `l`. Any number of lanes is right; 8 or a multiple of it is quick.
+/// `q[k][l]` is coordinate `k` of state `l`. Any number of lanes is right; 8 are quickest.
 #[derive(Clone, Debug, PartialEq)]
 #[rustfmt::skip]
 pub struct Chain100Lanes<const LANES: usize> {

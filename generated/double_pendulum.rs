@@ -1106,7 +1106,7 @@ impl<'a, P0: ::multibody::runtime::kernel::Read<f64> + ?Sized, P1: ::multibody::
 }
 
 /// `LANES` states of [`DoublePendulum`] at once, side by side in vector registers. In every array the last index is the lane:
-/// `q[k][l]` is coordinate `k` of state `l`. Any number of lanes is right; 8 or a multiple of it is quick.
+/// `q[k][l]` is coordinate `k` of state `l`. Any number of lanes is right; 8 are quickest.
 #[derive(Clone, Debug, PartialEq)]
 #[rustfmt::skip]
 pub struct DoublePendulumLanes<const LANES: usize> {

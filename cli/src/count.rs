@@ -38,6 +38,8 @@ struct Speed {
     instructions: usize,
     critical_path: u32,
     throughput: f64,
+    /// With sines and cosines, for one state and for each of eight at once.
+    bounds: [f64; 2],
 }
 
 /// Estimated speeds of every output in exact and in fast arithmetic.
@@ -54,6 +56,7 @@ fn speeds(plan: &Plan, options: &Options) -> Outcome<Vec<Speed>> {
                 instructions: program.instructions(),
                 critical_path: program.critical_path(),
                 throughput: program.throughput(),
+                bounds: [program.bound(), program.bound_of_lanes()],
             });
         }
     }
@@ -63,12 +66,20 @@ fn speeds(plan: &Plan, options: &Options) -> Outcome<Vec<Speed>> {
 /// The table of speeds.
 fn speed_table(speeds: &[Speed], out: &mut dyn Write) -> Outcome {
     writeln!(out, "\nCycles of a processor with two pipes that multiply and two that add (latencies: sum 3, product 4, division 13, sine 40):")?;
-    writeln!(out, "{:<24}{:>12}{:>14}{:>16}{:>14}", "", "operations", "instructions", "critical path", "busiest pipe")?;
+    writeln!(
+        out,
+        "{:<24}{:>12}{:>14}{:>16}{:>14}{:>14}",
+        "", "operations", "instructions", "critical path", "busiest pipe", "of 8 lanes"
+    )?;
     for s in speeds {
         let name = format!("{}, {}", s.group.name(), s.arithmetic.name());
-        let n = [s.counts.total(), s.instructions, s.critical_path as usize, s.throughput.round() as usize];
-        writeln!(out, "{name:<24}{:>12}{:>14}{:>16}{:>14}", n[0], n[1], n[2], n[3])?;
+        let n = [s.counts.total(), s.instructions, s.critical_path as usize, s.bounds[0].round() as usize];
+        writeln!(out, "{name:<24}{:>12}{:>14}{:>16}{:>14}{:>14.1}", n[0], n[1], n[2], n[3], s.bounds[1])?;
     }
+    writeln!(
+        out,
+        "  busiest pipe: with sines and divisions; of 8 lanes: the same for each of eight states at once, on two pipes of 64 bytes"
+    )?;
     Ok(())
 }
 
@@ -312,6 +323,8 @@ fn as_json(plan: &Plan, counts: &[OutputCounts], speeds: &[Speed], parts: &[Part
                 speed.insert("instructions".into(), json!(s.instructions));
                 speed.insert("critical_path".into(), json!(s.critical_path));
                 speed.insert("throughput".into(), json!(s.throughput));
+                speed.insert("bound".into(), json!(s.bounds[0]));
+                speed.insert("bound_of_lanes".into(), json!(s.bounds[1]));
                 output.insert(s.arithmetic.name().into(), json!(speed));
             }
             output

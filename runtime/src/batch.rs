@@ -4,6 +4,7 @@
 //! therefore computed together in vector registers without a transposition. Generated types have a method
 //! `rates_batch`; with feature `rayon`, `rates_parallel` distributes the states over several threads.
 
+use crate::kernel::Columns;
 use crate::Scalar;
 
 /// An error in the columns of a batch.
@@ -55,35 +56,28 @@ fn length(lengths: impl IntoIterator<Item = usize>) -> Result<usize, BatchError>
     }
 }
 
-/// Reads states `at..at + L` of the columns. Places after the last state are filled with the last state, which is
-/// valid.
+/// Fewer than `L` states as a block: its last places are filled with the last state, which is valid.
+fn padded<T: Scalar, const L: usize, const N: usize>(columns: &[&[T]; N]) -> [[T; L]; N] {
+    columns.map(|column| {
+        let mut lanes = [column.last().copied().unwrap_or(T::zero()); L];
+        lanes.iter_mut().zip(column).for_each(|(to, from)| *to = *from);
+        lanes
+    })
+}
+
+/// States `at..at + L` of some columns, where they are, if the columns are so long.
 #[inline(always)]
-fn load<T: Scalar, const L: usize, const N: usize>(columns: &[&[T]; N], at: usize, block: &mut [[T; L]; N]) {
-    for (column, lanes) in columns.iter().zip(block) {
-        let rest = column.get(at..).unwrap_or(&[]);
-        if let Some(full) = rest.first_chunk::<L>() {
-            *lanes = *full;
-        } else if let Some(last) = rest.last() {
-            *lanes = [*last; L];
-            lanes.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
+fn block<'a, T, const L: usize, const N: usize>(columns: &[&'a [T]; N], at: usize, block: &mut [&'a [T; L]; N]) {
+    for (column, block) in columns.iter().zip(block) {
+        if let Some(full) = column.get(at..).and_then(<[T]>::first_chunk) {
+            *block = full;
         }
     }
 }
 
-/// Writes a block to states `at..at + L` of the columns; places after the last state are dropped.
-#[inline(always)]
-fn store<T: Scalar, const L: usize, const N: usize>(block: &[[T; L]; N], at: usize, columns: &mut [&mut [T]; N]) {
-    for (lanes, column) in block.iter().zip(columns) {
-        let rest = column.get_mut(at..).unwrap_or(&mut []);
-        if let Some(full) = rest.first_chunk_mut::<L>() {
-            *full = *lanes;
-        } else {
-            rest.iter_mut().zip(lanes).for_each(|(to, from)| *to = *from);
-        }
-    }
-}
-
-/// Cuts columns into blocks of `L` states and runs a kernel on each; for generated code.
+/// Cuts columns into blocks of `L` states and runs a kernel on each; for generated code. The kernel reads and writes the
+/// columns themselves. A copy would be made here by narrower instructions than those of the kernel, which would wait for
+/// it.
 ///
 /// # Errors
 /// [`BatchError::Lengths`].
@@ -94,20 +88,25 @@ pub fn run<T: Scalar, const L: usize, const NQ: usize, const NV: usize, const NT
     tau: [&[T]; NT],
     mut qd: [&mut [T]; NQ],
     mut pd: [&mut [T]; NV],
-    mut kernel: impl FnMut(&[[T; L]; NQ], &[[T; L]; NV], &[[T; L]; NT], &mut [[T; L]; NQ], &mut [[T; L]; NV]),
+    mut kernel: impl FnMut(&[&[T; L]; NQ], &[&[T; L]; NV], &[&[T; L]; NT], &mut Columns<T, NQ>, &mut Columns<T, NV>),
 ) -> Result<(), BatchError> {
     let inputs = q.iter().chain(&p).chain(&tau).map(|c| c.len());
     let n = length(inputs.chain(qd.iter().chain(&pd).map(|c| c.len())))?;
     let zero = [T::zero(); L];
-    let (mut q_block, mut p_block, mut tau_block) = ([zero; NQ], [zero; NV], [zero; NT]);
-    let (mut qd_block, mut pd_block) = ([zero; NQ], [zero; NV]);
+    let (mut q_block, mut p_block, mut tau_block) = ([&zero; NQ], [&zero; NV], [&zero; NT]);
+    let (q_padded, p_padded, tau_padded);
+    if n < L {
+        (q_padded, p_padded, tau_padded) = (padded(&q), padded(&p), padded(&tau));
+        (q_block, p_block, tau_block) = (q_padded.each_ref(), p_padded.each_ref(), tau_padded.each_ref());
+    }
     for at in (0..n).step_by(L.max(1)) {
-        load(&q, at, &mut q_block);
-        load(&p, at, &mut p_block);
-        load(&tau, at, &mut tau_block);
-        kernel(&q_block, &p_block, &tau_block, &mut qd_block, &mut pd_block);
-        store(&qd_block, at, &mut qd);
-        store(&pd_block, at, &mut pd);
+        // The last block ends with the last state; what it has in common with the one before is computed twice.
+        let at = at.min(n.saturating_sub(L));
+        block(&q, at, &mut q_block);
+        block(&p, at, &mut p_block);
+        block(&tau, at, &mut tau_block);
+        let (mut qd, mut pd) = (Columns { columns: &mut qd, at }, Columns { columns: &mut pd, at });
+        kernel(&q_block, &p_block, &tau_block, &mut qd, &mut pd);
     }
     Ok(())
 }

@@ -13,9 +13,11 @@
 //! compiler vectorises this loop. If the processor has AVX-512 and the compiler is 1.89 or later, lanes that fill its
 //! registers use it.
 //!
-//! The only `unsafe` code of the runtime is at the end of this file. It calls functions that are compiled for more than
-//! the baseline of the target. This is sound because every call first asks [`level`] which instructions the processor
-//! has.
+//! The only `unsafe` code of the runtime is in this file. Its end calls functions that are compiled for more than the
+//! baseline of the target. This is sound because every call first asks [`level`] which instructions the processor has.
+//! [`PushedRows`] reads memory that it has written before, as it counts.
+
+use core::mem::MaybeUninit;
 
 /// The arithmetic of a kernel: how `a · b + c` is rounded. The numbers are `f64` or `f32` in every case.
 pub trait Arithmetic: Copy {
@@ -120,12 +122,46 @@ fn store_pair(to: &mut [f64; 2], x: [f64; 2]) {
     }
 }
 
+/// Columns of a batch of which a kernel writes the places from `at` on. Places after the last one are dropped.
+pub struct Columns<'a, 'c, T, const N: usize> {
+    /// One column for each number.
+    pub columns: &'a mut [&'c mut [T]; N],
+    /// Where lane 0 is written.
+    pub at: usize,
+}
+
+/// Copies as many numbers as there is room for. Apart from the copy of all of them, which would otherwise become a part of
+/// this one, of a length that is known at run time only.
+#[cold]
+#[inline(never)]
+fn give_some<T: Copy>(to: &mut [T], from: &[T]) {
+    to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
+}
+
 macro_rules! places {
     ($float:tt) => {
         places!(@one $float, [const N: usize], [$float; N]);
         places!(@one $float, [], [$float]);
         places!(@lanes $float, [const L: usize, const N: usize], [[$float; L]; N]);
         places!(@lanes $float, [const L: usize], [[$float; L]]);
+        // Blocks of a batch, which lie where the caller's columns are.
+        places!(@read $float, [const L: usize, const N: usize], [&[$float; L]; N]);
+        impl<const N: usize> Write<$float> for Columns<'_, '_, $float, N> {
+            #[inline(always)]
+            fn set(&mut self, k: usize, l: usize, x: $float) {
+                if let Some(to) = self.columns[k].get_mut(self.at + l) {
+                    *to = x;
+                }
+            }
+            #[inline(always)]
+            fn give<const L: usize>(&mut self, k: usize, x: &[$float; L]) {
+                let rest = self.columns[k].get_mut(self.at..).unwrap_or_default();
+                match rest.first_chunk_mut() {
+                    Some(to) => *to = *x,
+                    None => give_some(rest, x),
+                }
+            }
+        }
     };
     (@one $float:tt, [$($parameters:tt)*], $array:ty) => {
         impl<$($parameters)*> Read<$float> for $array {
@@ -154,16 +190,19 @@ macro_rules! places {
     };
     (@pair f32) => {};
     (@lanes $float:tt, [$($parameters:tt)*], $array:ty) => {
-        impl<$($parameters)*> Read<$float> for $array {
-            #[inline(always)]
-            fn get(&self, k: usize, l: usize) -> $float {
-                self[k][l]
-            }
-        }
+        places!(@read $float, [$($parameters)*], $array);
         impl<$($parameters)*> Write<$float> for $array {
             #[inline(always)]
             fn set(&mut self, k: usize, l: usize, x: $float) {
                 self[k][l] = x;
+            }
+        }
+    };
+    (@read $float:tt, [$($parameters:tt)*], $array:ty) => {
+        impl<$($parameters)*> Read<$float> for $array {
+            #[inline(always)]
+            fn get(&self, k: usize, l: usize) -> $float {
+                self[k][l]
             }
         }
     };
@@ -190,6 +229,51 @@ impl<T, const L: usize, const N: usize> core::ops::DerefMut for Rows<T, L, N> {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut Self::Target {
         &mut self.0
+    }
+}
+
+/// Rows of a loop that a kernel keeps for later loops: up to `N` rows of `R` numbers for each of `L` lanes. They are
+/// written in order and cost nothing before. (Zeros at the start take longer than all arithmetic of a simple loop.)
+#[cfg_attr(feature = "std", repr(align(64)))]
+pub struct PushedRows<T, const L: usize, const R: usize, const N: usize> {
+    /// The first `len` are written.
+    rows: [MaybeUninit<[[T; L]; R]>; N],
+    len: usize,
+}
+
+#[allow(unsafe_code)]
+impl<T: Copy, const L: usize, const R: usize, const N: usize> PushedRows<T, L, R, N> {
+    /// No rows.
+    #[inline(always)]
+    pub fn new() -> Self {
+        PushedRows { rows: [const { MaybeUninit::uninit() }; N], len: 0 }
+    }
+
+    /// Writes the next row.
+    ///
+    /// # Panics
+    /// If there are `N` already.
+    #[inline(always)]
+    pub fn push(&mut self, row: [[T; L]; R]) {
+        self.rows[self.len].write(row);
+        self.len += 1;
+    }
+
+    /// Row `k`, counted in the order of writing.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    #[inline(always)]
+    pub fn row(&self, k: usize) -> &[[T; L]; R] {
+        assert!(k < self.len, "a row is written before it is read");
+        // SAFETY: `len` counts the rows that `push` has written, from the first on.
+        unsafe { self.rows[k].assume_init_ref() }
+    }
+}
+
+impl<T: Copy, const L: usize, const R: usize, const N: usize> Default for PushedRows<T, L, R, N> {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
@@ -324,3 +408,6 @@ mod processor {
         K::run::<Best>(arguments);
     }
 }
+
+#[cfg(test)]
+mod tests;

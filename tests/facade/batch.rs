@@ -5,6 +5,7 @@ use multibody::runtime::kernel::{Kernel, Plain};
 
 multibody::mbd_model! { path = "models/ur5.urdf", name = Ur5, outputs = [rates, energy] }
 multibody::mbd_model! { path = "models/double_pendulum.toml", name = Single, outputs = [rates], scalar = f32 }
+multibody::mbd_model! { path = "models/chain100.toml", name = Chain, outputs = [rates, energy] }
 
 /// One column of `n` different numbers for each coordinate. The 5th and 12th state have angles so large that sine and
 /// cosine leave their main path.
@@ -77,6 +78,36 @@ fn any_lanes() {
     lanes::<4>();
     lanes::<8>();
     lanes::<16>();
+}
+
+/// The loops of rolled code compute sines turn by turn for several states, and all together for one: the bits are the
+/// same, also where sine and cosine leave their main path.
+#[test]
+fn rolled_code() {
+    fn lanes<const L: usize>() {
+        let mut chain = Chain::new();
+        chain.tau[7] = 0.5;
+        let (q, p) = (columns::<100>(L, 0.0), columns::<100>(L, 0.3));
+        let [q_lanes, p_lanes] = [&q, &p].map(|c| c.each_ref().map(|c| <[f64; L]>::try_from(c.as_slice()).unwrap()));
+        let (mut qd, mut pd) = ([[0.0; L]; 100], [[0.0; L]; 100]);
+        chain.lanes::<L>().rates(&q_lanes, &p_lanes, &mut qd, &mut pd);
+        let energy = chain.lanes::<L>().energy(&q_lanes, &p_lanes);
+        let tau = chain.tau.map(|x| vec![x; L]);
+        let (mut qds, mut pds) = ([0.0; 100].map(|x| vec![x; L]), [0.0; 100].map(|x| vec![x; L]));
+        chain.rates_batch(slices(&q), slices(&p), slices(&tau), slices_mut(&mut qds), slices_mut(&mut pds)).unwrap();
+        for l in 0..L {
+            let (mut qd1, mut pd1) = ([0.0; 100], [0.0; 100]);
+            chain.rates(&state(&q, l), &state(&p, l), &mut qd1, &mut pd1);
+            assert!(qd1.iter().chain(&pd1).all(|x| x.is_finite()), "lane {l} of {L}");
+            assert_eq!((qd.map(|x| x[l]), pd.map(|x| x[l])), (qd1, pd1), "lane {l} of {L}");
+            assert_eq!((state(&qds, l), state(&pds, l)), (qd1, pd1), "state {l} of {L}");
+            assert_eq!(energy.map(|x| x[l]), chain.energy(&state(&q, l), &state(&p, l)), "energy, lane {l} of {L}");
+        }
+    }
+    lanes::<1>();
+    lanes::<7>();
+    lanes::<8>();
+    lanes::<9>();
 }
 
 /// Plain arithmetic and the fastest arithmetic of the processor differ by rounding only.

@@ -65,7 +65,7 @@ pub fn lanes_type(out: &mut String, options: &Options, fields: &[Field], kernels
         out,
         "
 /// `LANES` states of [`{name}`] at once, side by side in vector registers. In every array the last index is the lane:
-/// `q[k][l]` is coordinate `k` of state `l`. Any number of lanes is right; {} or a multiple of it is quick.",
+/// `q[k][l]` is coordinate `k` of state `l`. Any number of lanes is right; {} are quickest.",
         width(options)
     );
     let lane = format!("[{t}; LANES]");

@@ -1,7 +1,7 @@
 //! Rolled programs: numbers between blocks in `kept`, numbers that a run stores from pass to pass in one row for each
 //! iteration, its constants in a table. Every block is a loop over lanes, as in straight-line code.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use super::head::Head;
@@ -9,38 +9,47 @@ use super::names::{heading, Names};
 use super::numbers::{minus, signed};
 use crate::options::Precision;
 use crate::plan::Plan;
-use crate::rolled::{Block, Loop, Place, Repeat, RolledProgram, Start, SweepDirection, Target};
-use crate::symbolic::angles::pairs;
-use crate::symbolic::{Op, ProgramResult};
+use crate::rolled::{Block, Loop, Place, Repeat, RolledProgram, Start, Target};
+use crate::symbolic::angles::Angles;
+use crate::symbolic::Op;
 
-/// Largest size of the rows of eight lanes on the stack, bytes. If they are larger, lanes are computed one after the
-/// other.
+/// Largest size of the rows on the stack, bytes. Lanes whose rows are larger are computed in groups, one after the other.
 const ROWS: usize = 1 << 19;
 
 /// Writes the function of a rolled program.
 pub struct RolledWriter<'a> {
     plan: &'a Plan,
-    program: &'a RolledProgram,
+    program: RolledProgram,
     head: Head<'a>,
-    /// Whether lanes are computed one after the other.
-    one_by_one: bool,
+    /// What every block keeps for later ones: numbers of the turn's row.
+    kept: Vec<Vec<usize>>,
+    /// Number of lanes of a group, where there are groups.
+    group: Option<usize>,
 }
 
 impl<'a> RolledWriter<'a> {
     /// A writer for one program.
     pub fn new(plan: &'a Plan, program: &'a RolledProgram, head: Head<'a>) -> Self {
-        let bytes = match head.options.precision {
-            Precision::F64 => 64,
-            Precision::F32 => 32,
+        let program = program.with_sines_in_loops();
+        let kept: Vec<Vec<usize>> = (0..program.blocks.len()).map(|k| kept_rows(&program.blocks, k)).collect();
+        let (lanes, size) = match head.options.precision {
+            Precision::F64 => (8, 8),
+            Precision::F32 => (16, 4),
         };
-        let rows: usize = program.loops.iter().map(|l| l.row * l.table.len()).sum();
-        RolledWriter { plan, program, head, one_by_one: rows * bytes > ROWS }
+        let turns = |block: &Block| block.run().map_or(0, |run| program.loops[run].table.len());
+        let numbers: usize = program.blocks.iter().zip(&kept).map(|(block, kept)| turns(block) * kept.len()).sum();
+        let mut group = lanes;
+        while group > 1 && numbers * size * group > ROWS {
+            group /= 2;
+        }
+        let group = (group < lanes || numbers * size * group > ROWS).then_some(group);
+        RolledWriter { plan, program, head, kept, group }
     }
 
     /// Index of the lane in inputs and results.
     fn lane(&self) -> &'static str {
-        if self.one_by_one {
-            "lane"
+        if self.group.is_some() {
+            "lane + l"
         } else {
             "l"
         }
@@ -48,30 +57,28 @@ impl<'a> RolledWriter<'a> {
 
     /// Function, kernel and tables.
     pub fn write(&self, out: &mut String) {
-        let (name, rt) = (&self.head.signature.name, &self.head.options.runtime);
         self.head.write(out, usize::MAX);
-        if self.one_by_one {
-            let ports: String = self.head.ports.iter().map(|p| format!(", {}", p.name)).collect();
-            let _ = writeln!(out, "        for lane in 0..LANES {{\n            Self::{name}_lane::<A>(lane{ports});");
-            let _ =
-                writeln!(out, "        }}\n    }}\n\n    /// One lane: the rows of many would not fit on the stack.");
-            let _ = writeln!(
-                out,
-                "    #[inline(always)]\n    fn {name}_lane<A: {rt}::kernel::Arithmetic>(lane: usize, {}) {{",
-                self.head.parameters()
-            );
-            let _ = writeln!(out, "        const LANES: usize = 1;");
+        if let Some(group) = self.group {
+            self.groups(out, group);
         }
         let _ = writeln!(out, "        let mut kept = {};", self.head.rows(self.program.kept));
-        for (k, run) in self.program.loops.iter().enumerate() {
-            let _ = writeln!(out, "        let mut rows{k} = [[[0.0; LANES]; {}]; {}];", run.row, run.table.len());
+        for (k, block) in self.program.blocks.iter().enumerate() {
+            let Some(run) = block.run().filter(|_| !self.kept[k].is_empty()) else { continue };
+            let (rt, t) = (&self.head.options.runtime, self.head.options.precision.name());
+            let (row, turns) = (self.kept[k].len(), self.program.loops[run].table.len());
+            let _ = writeln!(
+                out,
+                "        let mut rows{k} = {rt}::kernel::PushedRows::<{t}, LANES, {row}, {turns}>::new();"
+            );
         }
-        for block in &self.program.blocks {
+        for k in 0..self.program.blocks.len() {
+            self.all_turns(out, k);
+        }
+        for (k, block) in self.program.blocks.iter().enumerate() {
             let _ = writeln!(out, "        {{");
             match &block.repeat {
-                None => self.body(out, block, "            "),
-                Some(repeat) if repeat.way.is_none() => self.sines(out, block, repeat),
-                Some(repeat) => self.repeated(out, block, repeat),
+                None => self.body(out, k, "            "),
+                Some(repeat) => self.repeated(out, k, repeat),
             }
             let _ = writeln!(out, "        }}");
         }
@@ -79,6 +86,27 @@ impl<'a> RolledWriter<'a> {
         for (k, run) in self.program.loops.iter().enumerate() {
             self.table(out, k, run);
         }
+    }
+
+    /// The body of the kernel and the head of another one for some of its lanes.
+    fn groups(&self, out: &mut String, group: usize) {
+        let (name, rt) = (&self.head.signature.name, &self.head.options.runtime);
+        let ports: String = self.head.ports.iter().map(|p| format!(", {}", p.name)).collect();
+        let _ = writeln!(out, "        let mut lane = 0;");
+        for group in [group, 1].into_iter().take(if group > 1 { 2 } else { 1 }) {
+            let _ = writeln!(out, "        while LANES - lane >= {group} {{");
+            let _ = writeln!(out, "            Self::{name}_group::<A, {group}>(lane{ports});");
+            let _ = writeln!(out, "            lane += {group};\n        }}");
+        }
+        let _ = writeln!(
+            out,
+            "    }}\n\n    /// Some of the lanes: the rows of all would take too much of the stack.\n    #[inline(always)]"
+        );
+        let _ = writeln!(
+            out,
+            "    fn {name}_group<A: {rt}::kernel::Arithmetic, const LANES: usize>(lane: usize, {}) {{",
+            self.head.parameters()
+        );
     }
 
     fn table(&self, out: &mut String, k: usize, run: &Loop) {
@@ -99,14 +127,7 @@ impl<'a> RolledWriter<'a> {
         format!("{}_TABLE{run}", self.head.signature.name.to_ascii_uppercase())
     }
 
-    /// The row of the table, if it is read.
-    fn open_table(&self, out: &mut String, block: &Block, run: usize) {
-        if block.inputs.iter().any(|p| matches!(p, Place::Column(_))) {
-            let _ = writeln!(out, "                let table = &Self::{}[k];", self.table_name(run));
-        }
-    }
-
-    fn repeated(&self, out: &mut String, block: &Block, repeat: &Repeat) {
+    fn repeated(&self, out: &mut String, k: usize, repeat: &Repeat) {
         for (k, (start, _)) in repeat.carried.iter().enumerate() {
             let start = match *start {
                 Start::Const(x) => {
@@ -126,15 +147,10 @@ impl<'a> RolledWriter<'a> {
             let _ = writeln!(out, "            for l in 0..LANES {{ carried{k}[l] = {start}; }}");
         }
         let turns = self.program.loops[repeat.run].table.len();
-        let order = if repeat.way == Some(SweepDirection::TipToBase) {
-            format!("(0..{turns}).rev()")
-        } else {
-            format!("0..{turns}")
-        };
+        let order = if repeat.is_backward() { format!("(0..{turns}).rev()") } else { format!("0..{turns}") };
         let _ = writeln!(out, "            for k in {order} {{");
-        let _ = writeln!(out, "                let row = &mut rows{}[k];", repeat.run);
-        self.open_table(out, block, repeat.run);
-        self.body(out, block, "                ");
+        self.open_rows(out, k, repeat);
+        self.body(out, k, "                ");
         let _ = writeln!(out, "            }}");
         for (k, (_, end)) in repeat.carried.iter().enumerate() {
             if let Some(slot) = end {
@@ -143,64 +159,62 @@ impl<'a> RolledWriter<'a> {
         }
     }
 
-    /// Sines and cosines of all iterations together.
-    fn sines(&self, out: &mut String, block: &Block, repeat: &Repeat) {
-        let (run, turns) = (repeat.run, self.program.loops[repeat.run].table.len());
-        let names = Names::default().block(self.plan, self.program, block, self.head.inputs);
-        let angles = pairs(&block.program);
-        for k in 0..angles.len() {
-            let _ = writeln!(out, "            let mut angles{k} = {};", self.head.rows(turns));
-        }
-        let _ = writeln!(out, "            for k in 0..{turns} {{");
-        self.open_table(out, block, run);
-        let _ = writeln!(out, "                for l in 0..LANES {{");
-        for (id, op, _) in &block.program.steps {
-            if !matches!(op, Op::Sin(_) | Op::Cos(_)) {
-                let _ = writeln!(out, "                    let {} = {};", names[id], self.value(block, op, &names));
+    /// The rows that the body of a loop reads, and the row of the table.
+    fn open_rows(&self, out: &mut String, k: usize, repeat: &Repeat) {
+        let block = &self.program.blocks[k];
+        let read = block.rows_read();
+        for (from, kept) in self.kept[..k].iter().enumerate() {
+            let source = &self.program.blocks[from];
+            let Some(of) = source.repeat.as_ref().filter(|of| of.run == repeat.run) else { continue };
+            if kept.iter().any(|row| read.contains(row)) {
+                let turns = self.program.loops[repeat.run].table.len();
+                let number = if of.is_backward() { format!("{} - k", turns - 1) } else { "k".to_string() };
+                let _ = writeln!(out, "                let row{from} = rows{from}.row({number});");
             }
         }
-        for (k, angle) in angles.keys().enumerate() {
-            let _ = writeln!(out, "                    angles{k}[k][l] = {};", names[angle]);
-        }
-        let _ = writeln!(out, "                }}\n            }}");
-        for k in 0..angles.len() {
-            let call = self.head.sines_and_cosines(&format!("angles{k}"), turns);
-            let _ = writeln!(out, "            let (sines{k}, cosines{k}) = {call};");
-        }
-        let _ = writeln!(out, "            for k in 0..{turns} {{");
-        for (result, target) in block.program.outputs.iter().zip(&block.outputs) {
-            let (ProgramResult::Node(id, _), Target::Row(row)) = (result, target) else { continue };
-            let part = |(k, pair): (usize, &[Option<u32>; 2])| {
-                let name = ["sines", "cosines"].into_iter().zip(pair).find(|(_, node)| **node == Some(*id));
-                name.map(|(name, _)| format!("{name}{k}"))
-            };
-            if let Some(array) = angles.values().enumerate().find_map(part) {
-                let _ = writeln!(out, "                rows{run}[k][{row}] = {array}[k];");
-            }
-        }
-        let _ = writeln!(out, "            }}");
+        self.open_table(out, block, repeat.run);
     }
 
-    /// Statements and results, in a loop those of one iteration. Results are first collected in an array, as in
-    /// straight-line code.
-    fn body(&self, out: &mut String, block: &Block, indent: &str) {
-        let names = Names::default().block(self.plan, self.program, block, self.head.inputs);
+    /// The row of the table, if it is read.
+    fn open_table(&self, out: &mut String, block: &Block, run: usize) {
+        if block.inputs.iter().any(|p| matches!(p, Place::Column(_))) {
+            let _ = writeln!(out, "                let table = &Self::{}[k];", self.table_name(run));
+        }
+    }
+
+    /// Statements and results, in a loop those of one iteration. Inputs are copied first and results are collected in
+    /// an array, as in straight-line code.
+    fn body(&self, out: &mut String, k: usize, indent: &str) {
+        let block = &self.program.blocks[k];
+        let names = Names::default().block(self.plan, &self.program, block, self.head.inputs);
+        let angles = Angles::new(&block.program);
+        self.angles(out, k, &angles, &names, indent);
+        let given = self.given(out, block, &angles, indent);
         let n = block.outputs.len();
         if n > 0 {
             let _ = writeln!(out, "{indent}let mut results = {};", self.head.rows(n));
         }
         let _ = writeln!(out, "{indent}for l in 0..LANES {{");
         let mut last = None;
-        let mut late = pairs(&block.program);
-        for (id, op, label) in &block.program.steps {
+        let mut late = angles.late.clone();
+        for (id, op, label) in block.program.steps.iter().filter(|(id, ..)| angles.after.contains(id)) {
             let text = match op {
-                Op::Sin(a) | Op::Cos(a) => {
-                    // The first one of a pair represents both.
-                    let Some(pair) = late.remove(a) else { continue };
-                    let pair = pair.map(|id| id.map_or("_", |id| names[&id].as_str()));
-                    self.head.sine_and_cosine(pair, &names[a])
-                }
-                op => format!("let {} = {};", names[id], self.value(block, op, &names)),
+                Op::Sin(a) | Op::Cos(a) => match angles.early.keys().position(|angle| angle == a) {
+                    Some(k) => {
+                        let row = if matches!(op, Op::Sin(_)) { "sines" } else { "cosines" };
+                        format!("let {} = {row}[{k}][l];", names[id])
+                    }
+                    None => {
+                        // The first one of a pair represents both.
+                        let Some(pair) = late.remove(a) else { continue };
+                        let pair = pair.map(|id| id.map_or("_", |id| names[&id].as_str()));
+                        self.head.sine_and_cosine(pair, &names[a])
+                    }
+                },
+                op => match given.get(id) {
+                    Some(k) => format!("let {} = given[{k}][l];", names[id]),
+                    None => format!("let {} = {};", names[id], self.value(k, op, &names)),
+                },
             };
             if block.repeat.is_none() && last != Some(*label) && !matches!(op, Op::Input(_)) {
                 let _ = writeln!(out, "{indent}    // {}", heading(self.plan, *label));
@@ -212,34 +226,165 @@ impl<'a> RolledWriter<'a> {
             let _ = writeln!(out, "{indent}    results[{k}][l] = {};", self.head.value(result, &names));
         }
         let _ = writeln!(out, "{indent}}}");
+        self.results(out, k, indent);
+    }
+
+    /// Sines and cosines of the angles that depend on what the block reads.
+    fn angles(&self, out: &mut String, k: usize, angles: &Angles, names: &BTreeMap<u32, String>, indent: &str) {
+        let n = angles.early.len();
+        if n == 0 {
+            return;
+        }
+        let open = match self.turns_of_angles(k, angles) {
+            None => "let (sines, cosines) = {".to_string(),
+            Some(_) => {
+                let of_turn = ["sines", "cosines"].map(|name| {
+                    let all: Vec<String> = (0..n).map(|i| format!("{name}{k}[{n} * k + {i}]")).collect();
+                    format!("[{}]", all.join(", "))
+                });
+                format!("let (sines, cosines) = if LANES == 1 {{ ({}) }} else {{", of_turn.join(", "))
+            }
+        };
+        let _ = writeln!(out, "{indent}{open}");
+        let inner = &format!("{indent}    ");
+        let _ = writeln!(out, "{inner}let mut angles = {};", self.head.rows(n));
+        self.fill_angles(out, k, angles, names, inner, "");
+        let _ = writeln!(out, "{inner}{}\n{indent}}};", self.head.sines_and_cosines("angles", n));
+    }
+
+    /// Writes the angles of a turn to an array, from an index on.
+    fn fill_angles(
+        &self,
+        out: &mut String,
+        k: usize,
+        angles: &Angles,
+        names: &BTreeMap<u32, String>,
+        indent: &str,
+        from: &str,
+    ) {
+        let _ = writeln!(out, "{indent}for l in 0..LANES {{");
+        let steps = &self.program.blocks[k].program.steps;
+        for (id, op, _) in steps.iter().filter(|(id, ..)| angles.before.contains(id)) {
+            let _ = writeln!(out, "{indent}    let {} = {};", names[id], self.value(k, op, names));
+        }
+        for (k, angle) in angles.early.keys().enumerate() {
+            let _ = writeln!(out, "{indent}    angles[{from}{k}][l] = {};", names[angle]);
+        }
+        let _ = writeln!(out, "{indent}}}");
+    }
+
+    /// Number of turns, where the angles of all of them are known before the loop.
+    fn turns_of_angles(&self, k: usize, angles: &Angles) -> Option<usize> {
+        let block = &self.program.blocks[k];
+        let known = |place: Place| matches!(place, Place::Given(_) | Place::GivenOfTurn { .. } | Place::Column(_));
+        let steps = block.program.steps.iter().filter(|(id, ..)| angles.before.contains(id));
+        let mut inputs = steps.filter_map(|(_, op, _)| if let Op::Input(k) = op { Some(*k as usize) } else { None });
+        (!angles.early.is_empty() && inputs.all(|k| known(block.inputs[k])))
+            .then(|| block.run().map(|run| self.program.loops[run].table.len()))?
+    }
+
+    /// Sines and cosines of all turns of a loop, for a single state.
+    fn all_turns(&self, out: &mut String, k: usize) {
+        let block = &self.program.blocks[k];
+        let angles = Angles::new(&block.program);
+        let (Some(turns), Some(run)) = (self.turns_of_angles(k, &angles), block.run()) else { return };
+        let names = Names::default().block(self.plan, &self.program, block, self.head.inputs);
+        let n = angles.early.len();
+        let all = n * turns;
+        let _ = writeln!(out, "        let (sines{k}, cosines{k}) = if LANES == 1 {{");
+        let _ = writeln!(out, "            let mut angles = {};", self.head.rows(all));
+        let _ = writeln!(out, "            for k in 0..{turns} {{");
+        self.open_table(out, block, run);
+        self.fill_angles(out, k, &angles, &names, "                ", &format!("{n} * k + "));
+        let _ = writeln!(out, "            }}\n            {}", self.head.sines_and_cosines("angles", all));
+        let _ = writeln!(out, "        }} else {{ ([[0.0; LANES]; {all}], [[0.0; LANES]; {all}]) }};");
+    }
+
+    /// Copies inputs of the function. Returns their places in the copy.
+    fn given(&self, out: &mut String, block: &Block, angles: &Angles, indent: &str) -> BTreeMap<u32, usize> {
+        let steps = block.program.steps.iter().filter(|(id, ..)| angles.after.contains(id));
+        let inputs: Vec<(u32, String)> = steps
+            .filter_map(|(id, op, _)| match op {
+                Op::Input(k) => self.given_input(block.inputs[*k as usize]).map(|text| (*id, text)),
+                _ => None,
+            })
+            .collect();
+        if !inputs.is_empty() {
+            let _ = writeln!(out, "{indent}let mut given = {};", self.head.rows(inputs.len()));
+        }
+        for (k, (_, text)) in inputs.iter().enumerate() {
+            let _ = writeln!(out, "{indent}for l in 0..LANES {{ given[{k}][l] = {text}; }}");
+        }
+        inputs.iter().enumerate().map(|(k, (id, _))| (*id, k)).collect()
+    }
+
+    /// An input of the function, if the place is one.
+    fn given_input(&self, place: Place) -> Option<String> {
+        match place {
+            Place::Given(k) => Some(self.head.input(k, "", self.lane())),
+            Place::GivenOfTurn { first, stride } => Some(self.head.input(first, &of_turn(stride), self.lane())),
+            _ => None,
+        }
+    }
+
+    /// Writes the results of a block to their places.
+    fn results(&self, out: &mut String, k: usize, indent: &str) {
         let places = self.head.places();
-        for (k, target) in block.outputs.iter().enumerate() {
-            let given = |result: usize, more: &str| match (places[result], self.one_by_one) {
-                ((port, at), true) => format!("{port}.set({at}{more}, lane, results[{k}][0]);"),
-                ((port, at), false) => format!("{port}.give({at}{more}, &results[{k}]);"),
+        let mut row: BTreeMap<usize, usize> = BTreeMap::new();
+        for (k, target) in self.program.blocks[k].outputs.iter().enumerate() {
+            let given = |result: usize, more: &str| match (places[result], self.group) {
+                ((port, at), Some(_)) => {
+                    format!("for l in 0..LANES {{ {port}.set({at}{more}, lane + l, results[{k}][l]); }}")
+                }
+                ((port, at), None) => format!("{port}.give({at}{more}, &results[{k}]);"),
             };
             let text = match *target {
                 Target::Result(result) => given(result, ""),
                 Target::ResultOfTurn { first, stride } => given(first, &of_turn(stride)),
                 Target::Kept(slot) => format!("kept[{slot}] = results[{k}];"),
-                Target::Row(row) => format!("row[{row}] = results[{k}];"),
+                Target::Row(number) => {
+                    row.insert(number, k);
+                    continue;
+                }
                 Target::Carried(carried) => format!("carried{carried} = results[{k}];"),
             };
             let _ = writeln!(out, "{indent}{text}");
         }
-    }
-
-    fn value(&self, block: &Block, op: &Op, names: &BTreeMap<u32, String>) -> String {
-        let Op::Input(k) = op else { return self.head.expression(op, names) };
-        match block.inputs[*k as usize] {
-            Place::Given(k) => self.head.input(k, "", self.lane()),
-            Place::GivenOfTurn { first, stride } => self.head.input(first, &of_turn(stride), self.lane()),
-            Place::Kept(slot) => format!("kept[{slot}][l]"),
-            Place::Column(column) => format!("table[{column}]"),
-            Place::Row(row) => format!("row[{row}][l]"),
-            Place::Carried(k) => format!("carried{k}[l]"),
+        if !self.kept[k].is_empty() {
+            let row: Vec<String> = self.kept[k].iter().map(|number| format!("results[{}]", row[number])).collect();
+            let _ = writeln!(out, "{indent}rows{k}.push([{}]);", row.join(", "));
         }
     }
+
+    fn value(&self, k: usize, op: &Op, names: &BTreeMap<u32, String>) -> String {
+        let Op::Input(input) = op else { return self.head.expression(op, names) };
+        let place = self.program.blocks[k].inputs[*input as usize];
+        match place {
+            Place::Kept(slot) => format!("kept[{slot}][l]"),
+            Place::Column(column) => format!("table[{column}]"),
+            Place::Row(row) => {
+                let run = self.program.blocks[k].run();
+                let from =
+                    (0..k).find(|from| self.program.blocks[*from].run() == run && self.kept[*from].contains(&row));
+                let from = from.expect("a row is written before it is read");
+                let at = self.kept[from].iter().position(|kept| *kept == row).unwrap_or(0);
+                format!("row{from}[{at}][l]")
+            }
+            Place::Carried(k) => format!("carried{k}[l]"),
+            place => self.given_input(place).unwrap_or_default(),
+        }
+    }
+}
+
+/// Numbers of the turn's row that a block writes and a later one reads.
+fn kept_rows(blocks: &[Block], k: usize) -> Vec<usize> {
+    let later: BTreeSet<usize> =
+        blocks[k + 1..].iter().filter(|block| block.run() == blocks[k].run()).flat_map(Block::rows_read).collect();
+    let rows = blocks[k].outputs.iter().filter_map(|target| match target {
+        Target::Row(row) if later.contains(row) => Some(*row),
+        _ => None,
+    });
+    rows.collect()
 }
 
 /// The offset of an index in iteration `k` from that in iteration 0.

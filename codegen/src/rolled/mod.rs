@@ -1,4 +1,5 @@
 //! Loop form: runs of like links as loops over tables of their constants, the rest of the tree as straight-line code.
+//! Loop form: runs of like links as loops over tables of their constants, the rest of the tree as straight-line code.
 //!
 //! Straight-line code of a long chain outgrows the instruction cache and takes long to compile. Here every pass of a
 //! group (leaves to base, base to leaves) walks the tree once; where it meets a run, one turn is traced on symbols by
@@ -13,6 +14,7 @@ mod main_line;
 mod partition;
 mod pass_state;
 mod runs;
+mod sines;
 
 use std::collections::BTreeSet;
 
@@ -93,6 +95,13 @@ pub struct Repeat {
     pub way: Option<SweepDirection>,
     /// First values of what is carried, and where the last ones are kept.
     pub carried: Vec<(Start, Option<usize>)>,
+}
+
+impl Repeat {
+    /// Whether the loop goes from the last turn to the first.
+    pub fn is_backward(&self) -> bool {
+        self.way == Some(SweepDirection::TipToBase)
+    }
 }
 
 /// Straight-line code, or the body of a loop.

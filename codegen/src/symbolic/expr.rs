@@ -84,6 +84,28 @@ impl Op {
         };
         all.into_iter().flatten()
     }
+
+    /// The operation with other ids for its nodes.
+    pub fn renumbered(self, id: impl Fn(u32) -> u32) -> Op {
+        let o = |operand: Operand| match operand {
+            Operand::Node(k) => Operand::Node(id(k)),
+            constant => constant,
+        };
+        match self {
+            Op::Input(_) => self,
+            Op::Add(a, b) => Op::Add(o(a), o(b)),
+            Op::Sub(a, b) => Op::Sub(o(a), o(b)),
+            Op::Mul(a, b) => Op::Mul(o(a), o(b)),
+            Op::Div(a, b) => Op::Div(o(a), o(b)),
+            Op::Fma(f) => Op::Fma(Fma { a: o(f.a), b: o(f.b), c: o(f.c), ..f }),
+            Op::ReciprocalAbove(p) => {
+                Op::ReciprocalAbove(FlooredReciprocal { value: o(p.value), floor: o(p.floor), ..p })
+            }
+            Op::Sqrt(a) => Op::Sqrt(id(a)),
+            Op::Sin(a) => Op::Sin(id(a)),
+            Op::Cos(a) => Op::Cos(id(a)),
+        }
+    }
 }
 
 /// Origin of an operation: node of the tree (`None`: ground) and quantity.

@@ -1,6 +1,6 @@
 //! Model of the processor for schedules and cost estimates: roughly a Zen 4 or Skylake.
 
-use super::{Op, Operand, Program, ProgramResult};
+use super::{Counts, Op, Operand, Program, ProgramResult};
 
 /// Latency of an operation, in cycles.
 pub fn latency(op: &Op) -> u32 {
@@ -72,6 +72,21 @@ pub fn pipe(op: &Op) -> (Pipe, u32) {
     }
 }
 
+fn is_sine(op: &Op) -> bool {
+    matches!(op, Op::Sin(_) | Op::Cos(_))
+}
+
+/// Cycles for which a division of eight numbers at once occupies its pipe (measured on Sapphire Rapids: 15.4).
+const WIDE_DIVISION: f64 = 16.0;
+
+impl Counts {
+    /// Instructions of the sines and cosines with their reduction, counted in machine code of AVX-512: those that
+    /// multiply, fused or not, and those that add or combine bits.
+    fn sincos_instructions(&self) -> (usize, usize) {
+        (26 * self.sincos, 19 * self.sincos)
+    }
+}
+
 impl Program {
     /// Critical path: cycles from the inputs to the last result, with unlimited pipes.
     pub fn critical_path(&self) -> u32 {
@@ -88,12 +103,34 @@ impl Program {
     /// Smallest number of cycles that the pipes need for all operations except sines and cosines.
     pub fn throughput(&self) -> f64 {
         let busy = |which: Pipe| {
-            let trigonometry = |op: &Op| matches!(op, Op::Sin(_) | Op::Cos(_));
-            let pipes = self.steps.iter().filter(|(_, op, _)| !trigonometry(op)).map(|(_, op, _)| pipe(op));
+            let pipes = self.steps.iter().map(|(_, op, _)| op).filter(|op| !is_sine(op)).map(pipe);
             pipes.filter(|(pipe, _)| *pipe == which).map(|(_, cycles)| cycles).sum::<u32>()
         };
         let busiest = f64::from(busy(Pipe::Multiply).max(busy(Pipe::Add))) / PIPES as f64;
         busiest.max(self.instructions() as f64 / f64::from(WIDTH))
+    }
+
+    /// Smallest number of cycles that the pipes need for all operations, sines and cosines included.
+    pub fn bound(&self) -> f64 {
+        let busy = |which: Pipe| {
+            let pipes = self.steps.iter().map(|(_, op, _)| op).filter(|op| !is_sine(op)).map(pipe);
+            pipes.filter(|(pipe, _)| *pipe == which).map(|(_, cycles)| cycles).sum::<u32>() as usize
+        };
+        let (multiply, add) = self.counts().sincos_instructions();
+        let all = self.instructions() + multiply + add;
+        let busiest = (busy(Pipe::Multiply) + multiply).max(busy(Pipe::Add) + add) as f64 / PIPES as f64;
+        busiest.max(all as f64 / f64::from(WIDTH))
+    }
+
+    /// The same for each of eight states at once, on two pipes of 64 bytes that do everything, except that one of them
+    /// divides.
+    pub fn bound_of_lanes(&self) -> f64 {
+        let counts = self.counts();
+        let divisions = counts.divisions + counts.roots;
+        let (multiply, add) = counts.sincos_instructions();
+        let rest = self.instructions() - divisions + multiply + add;
+        let dividing = divisions as f64 * WIDE_DIVISION;
+        (0.5 * (rest as f64 + dividing)).max(dividing) / 8.0
     }
 
     /// Number of operations that become instructions: all except inputs, sines and cosines; a fused product and sum is

@@ -35,7 +35,13 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
     for &output in Output::ALL {
         let Some(program) = rolled(&plan, output, options) else { continue };
         nodes = nodes.max(program.program.loops.iter().map(|l| l.nodes.len()).sum());
-        let results = program.program.evaluate(&s.inputs_of(&program.inputs, &p, &a), |a, b, c| a * b + c);
+        let inputs = s.inputs_of(&program.inputs, &p, &a);
+        let results = program.program.evaluate(&inputs, |a, b, c| a * b + c);
+        let inside = program.program.with_sines_in_loops();
+        assert_eq!(inside.counts(), program.program.counts(), "{output:?}");
+        let bits = |x: &[f64]| x.iter().map(|x| x.to_bits()).collect::<Vec<u64>>();
+        let moved = inside.evaluate(&inputs, |a, b, c| a * b + c);
+        assert_eq!(bits(&moved), bits(&results), "{output:?} with sines in the loops");
         let expected = match output {
             Output::Rates => {
                 i.rates(&s.q, &p, &mut v, &mut qd, &mut pd);

@@ -29,31 +29,9 @@ fn renumber(program: &Program, order: &[u32]) -> Program {
         new[program.steps[at as usize].0 as usize] = k as u32;
     }
     let id = |k: u32| new[k as usize];
-    let o = |operand: Operand| match operand {
-        Operand::Node(k) => Operand::Node(id(k)),
-        constant => constant,
-    };
     let step = |(k, &at): (usize, &u32)| {
         let (_, op, label) = program.steps[at as usize];
-        let op = match op {
-            Op::Input(_) => op,
-            Op::Add(a, b) => Op::Add(o(a), o(b)),
-            Op::Sub(a, b) => Op::Sub(o(a), o(b)),
-            Op::Mul(a, b) => Op::Mul(o(a), o(b)),
-            Op::Div(a, b) => Op::Div(o(a), o(b)),
-            Op::Fma(mut f) => {
-                (f.a, f.b, f.c) = (o(f.a), o(f.b), o(f.c));
-                Op::Fma(f)
-            }
-            Op::ReciprocalAbove(mut p) => {
-                (p.value, p.floor) = (o(p.value), o(p.floor));
-                Op::ReciprocalAbove(p)
-            }
-            Op::Sqrt(a) => Op::Sqrt(id(a)),
-            Op::Sin(a) => Op::Sin(id(a)),
-            Op::Cos(a) => Op::Cos(id(a)),
-        };
-        (k as u32, op, label)
+        (k as u32, op.renumbered(id), label)
     };
     let output = |output: &ProgramResult| match *output {
         ProgramResult::Node(k, neg) => ProgramResult::Node(id(k), neg),

@@ -1,0 +1,44 @@
+//! Rows that are kept, and the ends of columns.
+
+use super::*;
+
+#[test]
+fn rows_are_read_as_they_were_pushed() {
+    let mut rows = PushedRows::<f64, 2, 3, 4>::new();
+    for k in 0..4 {
+        let x = f64::from(k);
+        rows.push([[x, -x], [10.0 + x, 0.5], [1.0, 2.0]]);
+        assert_eq!(rows.row(k as usize)[1], [10.0 + x, 0.5]);
+    }
+    assert_eq!(rows.row(0)[0], [0.0, -0.0]);
+    assert_eq!(rows.row(3)[0], [3.0, -3.0]);
+}
+
+#[test]
+#[should_panic(expected = "written before it is read")]
+fn a_row_that_is_not_there() {
+    let mut rows = PushedRows::<f64, 1, 1, 2>::default();
+    rows.push([[1.0]]);
+    rows.row(1);
+}
+
+#[test]
+#[should_panic(expected = "out of bounds")]
+fn more_rows_than_there_is_room_for() {
+    let mut rows = PushedRows::<f32, 1, 1, 1>::new();
+    rows.push([[1.0]]);
+    rows.push([[1.0]]);
+}
+
+/// Blocks of a batch at the end of the columns.
+#[test]
+fn places_after_the_last_state_are_dropped() {
+    let (mut a, mut b) = ([0.0; 5], [0.0; 5]);
+    let mut columns = [&mut a[..], &mut b[..]];
+    let mut block = Columns { columns: &mut columns, at: 3 };
+    block.give(1, &[1.0, 2.0, 3.0, 4.0]);
+    block.set(0, 1, 5.0);
+    block.set(0, 2, 6.0);
+    Columns { columns: &mut columns, at: 1 }.give(0, &[7.0; 2]);
+    assert_eq!((a, b), ([0.0, 7.0, 7.0, 0.0, 5.0], [0.0, 0.0, 0.0, 1.0, 2.0]));
+}
