@@ -38,11 +38,14 @@ pub fn has_rows(plan: &Plan, i: usize) -> bool {
 
 /// Unbranched paths of single-freedom joints, inner joint first, that are eliminated as chains. No row of a constraint
 /// passes through them. They are as long as
-/// possible, and each has a coordinate that it can solve. Those at the tips come first, in the order of the nodes;
+/// possible, and each joint has a coordinate of its own. Those at the tips come first, in the order of the nodes;
 /// every other chain comes after those beyond it.
 pub fn chains(plan: &Plan) -> Vec<Vec<usize>> {
     let children = children(plan);
-    let inside: Vec<bool> = (0..plan.nodes.len()).map(|i| plan.nodes[i].kind.nv() == 1 && !has_rows(plan, i)).collect();
+    // A coordinate that several joints share, or a drive, would be missed where screws meet columns.
+    let own = |node: &PlanNode| node.elimination.unknown.is_none() && matches!(node.source, Source::State { .. });
+    let single = |i: usize| plan.nodes[i].kind.nv() == 1 && own(&plan.nodes[i]) && !has_rows(plan, i);
+    let inside: Vec<bool> = (0..plan.nodes.len()).map(single).collect();
     let mut all: Vec<Vec<usize>> = Vec::new();
     for i in (0..plan.nodes.len()).filter(|&i| inside[i]) {
         let inner = plan.nodes[i].parent.filter(|&p| inside[p] && children[p] == 1);
@@ -51,12 +54,6 @@ pub fn chains(plan: &Plan) -> Vec<Vec<usize>> {
             None => all.push(vec![i]),
         }
     }
-    let solves = |i: usize| {
-        let elimination = &plan.nodes[i].elimination;
-        let own = elimination.unknown.is_none() && matches!(plan.nodes[i].source, Source::State { .. });
-        own || !elimination.solve_before.is_empty() || !elimination.solve_after.is_empty()
-    };
-    all.retain(|chain| chain.iter().any(|&i| solves(i)));
     // Number of chains beyond each, on the longest way to a tip.
     let mut beyond = vec![0; all.len()];
     for k in (0..all.len()).rev() {

@@ -193,7 +193,7 @@ fn open_beyond(search: &mut ChainSearch, part: &ChainInPart, beyond: &mut Choice
             let other = &beyond.0[kind[0]];
             (other.chain.len(), &other.best, &other.passing) == (choice.chain.len(), &choice.best, &choice.passing)
         };
-        match kinds.iter().position(|kind| like(kind)) {
+        match kinds.iter().position(like) {
             Some(kind) => kinds[kind].push(k),
             None => kinds.push(vec![k]),
         }
