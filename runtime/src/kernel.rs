@@ -61,6 +61,10 @@ impl Arithmetic for Fused {
     }
 }
 
+/// Whether the target has vector instructions that kernels for one state use, where they compute like branches of a
+/// mechanism at the same time. Without `std`, code is small instead.
+pub const VECTORS: bool = cfg!(feature = "std");
+
 /// Body number `ID` of a generated type, for `L` lanes.
 ///
 /// `run` must be `#[inline(always)]`: it is then compiled as part of its caller, for the instructions that the caller

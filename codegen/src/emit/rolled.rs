@@ -238,6 +238,7 @@ impl<'a> RolledWriter<'a> {
             Place::Column(column) => format!("table[{column}]"),
             Place::Row(row) => format!("row[{row}][l]"),
             Place::Carried(k) => format!("carried{k}[l]"),
+            Place::RowOfBranch { run, turn, row } => format!("rows{run}[{turn}][{row}][l]"),
         }
     }
 }

@@ -6,10 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use mbd_runtime::tree::{Source, Tree};
 
 use super::link::Link;
-use super::main_line::MainLine;
+use super::main_line::{Event, MainLine};
 use super::partition::{assemble, output, partition, Body, Requests};
 use super::pass_state::{OutputSweeps, PassState};
-use super::runs::{find, Run};
+use super::runs::Run;
 use super::{Block, Loop, Place, Repeat, RolledProgram, Start, Target};
 use crate::options::Options;
 use crate::output::{Dim, InputArray, Output, OutputProgram};
@@ -17,8 +17,13 @@ use crate::plan::Plan;
 use crate::symbolic::{passes, Expr, Graph, Op, Operand, ProgramResult};
 use crate::trace::{rewrite, sizes, tolerance, SymbolicInputs};
 
-/// Builds the loop form; `None` where no run is long enough.
-pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Option<OutputProgram<RolledProgram>> {
+/// Builds the loop form with the runs that `find` finds among the nodes that are allowed; `None` where there are none.
+pub fn build(
+    plan: &Plan,
+    group: Output,
+    options: &Options,
+    find: impl Fn(&Tree<Expr>, &[bool]) -> Vec<Run>,
+) -> Option<OutputProgram<RolledProgram>> {
     let sweeps = OutputSweeps::of(group)?;
     let graph = Graph::default();
     let given = SymbolicInputs::new(&graph, plan, group.spec(), options);
@@ -31,7 +36,7 @@ pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Opt
     };
     let passes = sweeps.passes(&tree)?;
     let allowed: Vec<bool> = plan_of_tree.nodes.iter().map(|n| n.rolled).collect();
-    let runs: Vec<Run> = find(&tree, &allowed, least).into_iter().filter(|run| steady(&tree, run)).collect();
+    let runs: Vec<Run> = find(&tree, &allowed).into_iter().filter(|run| steady(&tree, run)).collect();
     if runs.is_empty() {
         return None;
     }
@@ -44,6 +49,12 @@ pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Opt
     let mut line = MainLine { graph: &graph, stage, given, runs: &runs, events: Vec::new(), next_input };
     for (number, pass) in passes.iter().enumerate() {
         line.pass(number, pass.direction, &mut links);
+    }
+    // What adds up over all nodes has an order, in which branches do not wait for each other.
+    let mut adds_up = false;
+    (0..passes.len()).for_each(|pass| line.stage.running(pass, &line.given, |_| adds_up = true));
+    if adds_up && runs.iter().any(|run| run.branches.is_some()) {
+        return None;
     }
     let results = line.stage.finish(&line.given);
     let own: Vec<Vec<(Expr, Target)>> = links
@@ -65,6 +76,9 @@ fn state_of(tree: &Tree<Expr>, i: usize) -> (usize, usize) {
 
 /// Whether coordinates move on by the same number from turn to turn.
 fn steady(tree: &Tree<Expr>, run: &Run) -> bool {
+    if run.branches.is_some() {
+        return true;
+    }
     let sizes = |i: usize| (tree.nodes[i].kind.nq(), tree.nodes[i].kind.nv());
     let mut at = state_of(tree, run.nodes.start);
     run.nodes.clone().all(|i| {
@@ -88,14 +102,14 @@ fn results_of_turn<'g>(
     let mut results = link.finish().into_iter();
     for array in group.spec().results {
         let turn = match array.dims {
-            [Dim::Nq] => Some((start.0, link.size.0)),
-            [Dim::Nv] => Some((start.1, link.size.1)),
+            [Dim::Nq] => Some((start.0, link.size.0, link.stride.0)),
+            [Dim::Nv] => Some((start.1, link.size.1, link.stride.1)),
             _ => None,
         };
         let len = array.len(&sizes);
         match turn {
-            Some((first, n)) => {
-                let target = |k| Target::ResultOfTurn { first: offset + first + k, stride: n };
+            Some((first, n, stride)) => {
+                let target = |k| Target::ResultOfTurn { first: offset + first + k, stride };
                 targets.extend(results.by_ref().take(n).zip((0..n).map(target)));
             }
             // What belongs to no turn.
@@ -150,7 +164,8 @@ impl<'m> Build<'_, 'm, '_> {
     }
 
     fn live(&self) -> Live {
-        let passes = |link: &Link| link.passes.iter().map(|p| vec![false; p.incoming.len()]).collect();
+        let passes =
+            |link: &Link| link.passes.iter().map(|p| vec![false; p.incoming.len().max(p.outgoing.len())]).collect();
         let mut live = Live {
             main: vec![false; self.line.graph.len()],
             links: self.graphs.iter().map(|g| vec![false; g.len()]).collect(),
@@ -165,6 +180,7 @@ impl<'m> Build<'_, 'm, '_> {
             for event in self.line.events.iter().rev() {
                 let (link, graph) = (&self.links[event.run], &self.graphs[event.run]);
                 let pass = &link.passes[event.pass];
+                settled &= !self.live_in_branches(event, &mut live);
                 for (k, (start, end)) in event.start.iter().zip(&event.end).enumerate() {
                     let read = |e: Expr, live: &[bool]| matches!(e, Expr::Node { id, .. } if live[id as usize]);
                     let wanted = read(*end, &live.main) || read(pass.incoming[k], &live.links[event.run]);
@@ -181,10 +197,49 @@ impl<'m> Build<'_, 'm, '_> {
         }
     }
 
+    /// Marks what branches need of their parent, and the parent of them. Returns whether something was not marked yet.
+    fn live_in_branches(&self, event: &Event<'_>, live: &mut Live) -> bool {
+        let Some(_) = &self.line.runs[event.run].branches else { return false };
+        let pass = &self.links[event.run].passes[event.pass];
+        let read = |e: Expr, live: &[bool]| matches!(e, Expr::Node { id, .. } if live[id as usize]);
+        let mut more = false;
+        for k in 0..live.carried[event.run][event.pass].len() {
+            let outward = pass.incoming.get(k).is_some_and(|e| read(*e, &live.links[event.run]));
+            let inward = event.handed.iter().any(|share| share.get(k).is_some_and(|e| read(*e, &live.main)));
+            if (outward || inward) && !std::mem::replace(&mut live.carried[event.run][event.pass][k], true) {
+                more = true;
+                if inward {
+                    mark(&self.graphs[event.run], &mut live.links[event.run], pass.outgoing[k]);
+                } else {
+                    mark(self.line.graph, &mut live.main, event.start[k]);
+                }
+            }
+        }
+        more
+    }
+
+    /// Where the straight-line code finds what branches hand to their parents.
+    fn handed(&self, rows: &[BTreeMap<u32, usize>]) -> BTreeMap<u32, Place> {
+        let mut places = BTreeMap::new();
+        for event in &self.line.events {
+            let outgoing = &self.links[event.run].passes[event.pass].outgoing;
+            for (turn, share) in event.handed.iter().enumerate() {
+                for (outer, inner) in share.iter().zip(outgoing) {
+                    let (Expr::Node { id, .. }, Expr::Node { id: inner, .. }) = (*outer, *inner) else { continue };
+                    if let Some(&row) = rows[event.run].get(&inner) {
+                        places.insert(id, Place::RowOfBranch { run: event.run, turn, row });
+                    }
+                }
+            }
+        }
+        places
+    }
+
     fn program(&mut self, options: &Options) -> RolledProgram {
         let live = self.live();
         let mut loops = Vec::new();
         let mut bodies: Vec<BTreeMap<Option<usize>, Body>> = Vec::new();
+        let mut rows = Vec::new();
         for (k, run) in self.line.runs.iter().enumerate() {
             let given = &self.line.given;
             let (q, v) = self.starts[k];
@@ -194,11 +249,20 @@ impl<'m> Build<'_, 'm, '_> {
                 first: [q, given.q.len() + v, given.first_of("a") + v, given.first_of("tau") + v],
             };
             let code = partition(&self.graphs[k], &self.links[k], run, &live.links[k], &wanted);
-            loops.push(Loop { nodes: run.nodes.clone(), period: run.period, table: code.table, row: code.row });
+            let branches = run.branches.as_ref().map_or(Vec::new(), |branches| branches.roots.clone());
+            loops.push(Loop {
+                nodes: run.nodes.clone(),
+                period: run.period,
+                table: code.table,
+                row: code.row,
+                branches,
+            });
+            rows.push(code.rows);
             bodies.push(code.bodies.into_iter().map(|b| (b.pass, b)).collect());
         }
         let units = self.units(&live);
         let (kept, slots) = self.slots(&units, &live);
+        let handed = self.handed(&rows);
         let mut blocks = Vec::new();
         for (k, bodies) in bodies.iter_mut().enumerate() {
             if let Some(b) = bodies.remove(&None) {
@@ -208,10 +272,13 @@ impl<'m> Build<'_, 'm, '_> {
         }
         for unit in &units {
             match unit {
-                Unit::Straight(own) => blocks.extend(self.straight(own, &slots, unit_is_last(unit, &units))),
+                Unit::Straight(own) => blocks.extend(self.straight(own, &slots, &handed, unit_is_last(unit, &units))),
                 Unit::Loop(event) => {
                     let event = &self.line.events[*event];
                     let Some(b) = bodies[event.run].remove(&Some(event.pass)) else { continue };
+                    if b.outputs.is_empty() {
+                        continue;
+                    }
                     let carried = self.carried(event, &live, &slots);
                     let repeat = Some(Repeat { run: event.run, way: Some(event.direction), carried });
                     blocks.push(Block { program: b.program, inputs: b.inputs, outputs: b.outputs, repeat });
@@ -272,6 +339,13 @@ impl<'m> Build<'_, 'm, '_> {
                 Unit::Loop(event) => {
                     let event = &self.line.events[*event];
                     let needed = &live.carried[event.run][event.pass];
+                    if self.line.runs[event.run].branches.is_some() {
+                        for (start, _) in event.start.iter().zip(needed).filter(|(_, needed)| **needed) {
+                            if let Expr::Node { id, .. } = *start {
+                                read(id);
+                            }
+                        }
+                    }
                     for ((start, end), _) in event.start.iter().zip(&event.end).zip(needed).filter(|(_, n)| **n) {
                         if let Expr::Node { id, .. } = *start {
                             read(id);
@@ -306,7 +380,13 @@ impl<'m> Build<'_, 'm, '_> {
         (count, slots)
     }
 
-    fn straight(&self, own: &BTreeSet<u32>, slots: &BTreeMap<u32, usize>, is_last: bool) -> Option<Block> {
+    fn straight(
+        &self,
+        own: &BTreeSet<u32>,
+        slots: &BTreeMap<u32, usize>,
+        handed: &BTreeMap<u32, Place>,
+        is_last: bool,
+    ) -> Option<Block> {
         let mut outputs: Vec<(ProgramResult, Target)> = Vec::new();
         for (k, e) in self.results() {
             let here = match e {
@@ -327,7 +407,7 @@ impl<'m> Build<'_, 'm, '_> {
         let given: usize = self.line.given.arrays.iter().map(InputArray::len).sum();
         let place = |id: u32| match self.line.graph.get(id).0 {
             Op::Input(k) if (k as usize) < given => Place::Given(k as usize),
-            _ => Place::Kept(slots[&id]),
+            _ => handed.get(&id).copied().unwrap_or_else(|| Place::Kept(slots[&id])),
         };
         if outputs.is_empty() {
             return None;
@@ -336,15 +416,12 @@ impl<'m> Build<'_, 'm, '_> {
         Some(Block { program, inputs, outputs, repeat: None })
     }
 
-    fn carried(
-        &self,
-        event: &super::main_line::Event<'_>,
-        live: &Live,
-        slots: &BTreeMap<u32, usize>,
-    ) -> Vec<(Start, Option<usize>)> {
+    fn carried(&self, event: &Event<'_>, live: &Live, slots: &BTreeMap<u32, usize>) -> Vec<(Start, Option<usize>)> {
         let incoming = &self.links[event.run].passes[event.pass].incoming;
         let needed = &live.carried[event.run][event.pass];
-        let places = event.start.iter().zip(&event.end).zip(incoming.iter().zip(needed));
+        // Branches hand nothing on to each other.
+        let ends = event.end.iter().map(Some).chain(std::iter::repeat(None));
+        let places = event.start.iter().zip(ends).zip(incoming.iter().zip(needed));
         places
             .filter(|(_, (incoming, needed))| **needed && matches!(incoming, Expr::Node { .. }))
             .map(|((start, end), _)| {
@@ -355,7 +432,10 @@ impl<'m> Build<'_, 'm, '_> {
                         _ => Start::Kept(slots[&id], neg),
                     },
                 };
-                let end = if let Expr::Node { id, .. } = *end { slots.get(&id).copied() } else { None };
+                let end = match end {
+                    Some(Expr::Node { id, .. }) => slots.get(id).copied(),
+                    _ => None,
+                };
                 (start, end)
             })
             .collect()

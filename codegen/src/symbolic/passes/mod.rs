@@ -58,6 +58,14 @@ pub fn run(program: Program, rewrite: Rewrite) -> Program {
             }
         }
     };
+    order(program, rewrite)
+}
+
+/// The program in the order in which it is to be emitted; its operations stay.
+pub fn order(program: Program, rewrite: Rewrite) -> Program {
+    if rewrite == Rewrite::None {
+        return program;
+    }
     let wide = program.throughput() >= WIDE * f64::from(program.critical_path());
     match wide && program.instructions() >= LONG {
         true => program,

@@ -1,0 +1,53 @@
+//! Like branches of one node computed at the same time, one in each lane of a vector register, for one state.
+
+use super::{build, siblings, RolledProgram};
+use crate::options::{Arithmetic, LikeBranches, Options};
+use crate::output::{Output, OutputProgram};
+use crate::plan::{Plan, RowsThatAct};
+use crate::symbolic::{passes, Expr, Graph, Program};
+use crate::trace::rewrite;
+
+/// The program of an output that computes like branches together, and the same statements branch by branch.
+#[derive(Clone, Debug)]
+pub struct Together {
+    /// With loops over the branches.
+    pub program: RolledProgram,
+    /// Without loops: the same operations on the same numbers.
+    pub apart: Program,
+}
+
+/// Like branches together in an output; `None` where there are none.
+pub fn together(plan: &Plan, group: Output, options: &Options) -> Option<OutputProgram<Together>> {
+    if !matches!(plan.acts, RowsThatAct::All) || plan.dims.rows > 0 {
+        return None;
+    }
+    if options.plan.branches == LikeBranches::Apart {
+        return None;
+    }
+    let turns = options.arithmetic == Arithmetic::Fast;
+    let built = build::build(plan, group, options, |tree, _| siblings::find(tree, turns))?;
+    let count = built.inputs.iter().map(crate::output::InputArray::len).sum::<usize>();
+    Some(built.map(|program| {
+        let graph = Graph::default();
+        let inputs: Vec<Expr> = (0..count).map(|k| graph.input(k)).collect();
+        let results = program.evaluate(&inputs, |a, b, c| graph.fma(a, b, c));
+        let apart = passes::order(Program::new(&graph, &results), rewrite(options));
+        Together { program, apart }
+    }))
+}
+
+/// Largest share of the instructions of straight-line code with which branches are computed together. A loop over
+/// branches also moves numbers into vectors and out of them.
+const WORTH: f64 = 0.8;
+
+/// Fewest instructions of straight-line code, below which sums and inputs take most of the time.
+const LEAST: usize = 300;
+
+impl Together {
+    /// Whether it is to replace straight-line code for one state.
+    pub fn pays(&self, straight: &Program, options: &Options) -> bool {
+        let instructions: usize = self.program.blocks.iter().map(|block| block.program.instructions()).sum();
+        let (together, apart) = (instructions as f64, straight.instructions());
+        options.plan.branches == LikeBranches::Together || (apart >= LEAST && together <= WORTH * apart as f64)
+    }
+}
