@@ -208,7 +208,6 @@ impl<'a> TogetherWriter<'a> {
     }
 
     fn value(&self, b: usize, block: &Block, op: &Op) -> String {
-        let of_branches = block.repeat.is_some();
         let k = match op {
             Op::Input(k) => *k as usize,
             Op::Sin(a) | Op::Cos(a) => {
@@ -230,7 +229,7 @@ impl<'a> TogetherWriter<'a> {
                 Start::Given(k, neg) => format!("{}{}", minus(neg), self.head.input(k, "", "0")),
             },
             (Place::RowOfBranch { run, turn, row }, _) => self.row(run, row, &turn.to_string()),
-            (place, None) => unreachable!("{place:?} outside of a loop, {of_branches}"),
+            (place, None) => unreachable!("{place:?} outside of a loop"),
         }
     }
 

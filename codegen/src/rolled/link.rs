@@ -8,9 +8,9 @@ use mbd_runtime::tree::{
 };
 use mbd_runtime::Scalar;
 
-use super::partition::constant;
 use super::pass_state::{read, PassState};
 use super::runs::{map_node, Run, Slot};
+use super::turn_constants::constant;
 use super::SweepDirection;
 use crate::output::Output;
 use crate::symbolic::{Expr, Graph};

@@ -13,8 +13,10 @@ mod main_line;
 mod partition;
 mod pass_state;
 mod runs;
+mod share;
 mod siblings;
 mod together;
+mod turn_constants;
 
 use std::collections::BTreeSet;
 
