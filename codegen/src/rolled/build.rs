@@ -46,14 +46,15 @@ pub fn build(
     let mut links: Vec<Link> = graphs.iter().zip(&runs).map(link).collect::<Option<_>>()?;
     let next_input = given.arrays.iter().map(InputArray::len).sum();
     let stage = PassState::new(group, &graph, tree, &passes)?;
-    let mut line = MainLine { graph: &graph, stage, given, runs: &runs, events: Vec::new(), next_input };
+    let mut line =
+        MainLine { graph: &graph, stage, given, runs: &runs, events: Vec::new(), next_input, passed_on: false };
     for (number, pass) in passes.iter().enumerate() {
         line.pass(number, pass.direction, &mut links);
     }
     // What adds up over all nodes has an order, in which branches do not wait for each other.
     let mut adds_up = false;
     (0..passes.len()).for_each(|pass| line.stage.running(pass, &line.given, |_| adds_up = true));
-    if adds_up && runs.iter().any(|run| run.branches.is_some()) {
+    if (adds_up || line.passed_on) && runs.iter().any(|run| run.branches.is_some()) {
         return None;
     }
     let results = line.stage.finish(&line.given);

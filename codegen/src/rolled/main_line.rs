@@ -4,7 +4,8 @@ use super::link::Link;
 use super::pass_state::{read, PassState};
 use super::runs::Run;
 use super::SweepDirection;
-use crate::symbolic::{Expr, Graph};
+use crate::output::InputArray;
+use crate::symbolic::{Expr, Graph, Op};
 use crate::trace::SymbolicInputs;
 
 /// A pass over a run, as the rest of the tree sees it.
@@ -39,6 +40,8 @@ pub struct MainLine<'m, 'a> {
     pub events: Vec<Event<'m>>,
     /// Number of the next symbol.
     pub next_input: usize,
+    /// Whether a branch takes in what another one hands over unchanged, which has no place between loops.
+    pub passed_on: bool,
 }
 
 impl<'m> MainLine<'m, '_> {
@@ -181,6 +184,11 @@ impl<'m> MainLine<'m, '_> {
             SweepDirection::TipToBase => Vec::new(),
             SweepDirection::BaseToTip => read(|visit| stage.carried(pass, parent, given, visit)),
         };
+        let given: usize = self.given.arrays.iter().map(InputArray::len).sum();
+        self.passed_on |= start.iter().any(|e| match *e {
+            Expr::Node { id, .. } => matches!(self.graph.get(id).0, Op::Input(k) if k as usize >= given),
+            Expr::Const(_) => false,
+        });
         let at = self.graph.len();
         link.pass_of_branch(pass, direction, &start);
         let number = link.passes.len() - 1;

@@ -48,6 +48,10 @@ impl Together {
     pub fn pays(&self, straight: &Program, options: &Options) -> bool {
         let instructions: usize = self.program.blocks.iter().map(|block| block.program.instructions()).sum();
         let (together, apart) = (instructions as f64, straight.instructions());
-        options.plan.branches == LikeBranches::Together || (apart >= LEAST && together <= WORTH * apart as f64)
+        // Bodies of loops are not written in parts; scopes in scopes beyond this are too deep for compilers.
+        let longest = self.program.blocks.iter().map(|block| block.program.steps.len()).max().unwrap_or(0);
+        let fits = longest <= 2 * options.chunk.max(1000);
+        let saves = apart >= LEAST && together <= WORTH * apart as f64;
+        options.plan.branches == LikeBranches::Together || (fits && saves)
     }
 }
