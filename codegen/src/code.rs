@@ -9,7 +9,7 @@ use crate::modes::{ModeChoice, OF_EACH_SET};
 use crate::options::{Arithmetic, Options, Precision};
 use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
-use crate::rolled::{rolled, together, RolledProgram};
+use crate::rolled::{rolled, together, RolledProgram, Vectors};
 use crate::symbolic::{Counts, Op, Operand, Program, ProgramResult};
 use crate::trace::{chosen_frames, coordinate_rates, sizes, trace};
 
@@ -74,7 +74,7 @@ pub struct Programs {
     /// Lengths of all arrays.
     pub sizes: Sizes,
     /// Programs that compute like branches together for one state, by the names of their outputs.
-    pub together: Vec<(&'static str, RolledProgram)>,
+    pub together: Vec<(&'static str, RolledProgram, Vectors)>,
     /// Programs of the outputs in [`OF_EACH_SET`] for sets of modes of contacts.
     pub sets: Vec<SetPrograms>,
 }
@@ -140,14 +140,12 @@ impl Programs {
     pub fn with_like_branches(mut self, plan: &Plan, options: &Options) -> Programs {
         for (output, program) in options.outputs.iter().zip(&mut self.outputs) {
             let Code::Straight(straight) = &mut program.program else { continue };
-            let Some(both) = together(plan, *output, options).filter(|both| both.program.pays(straight, options))
-            else {
-                continue;
-            };
+            let Some(both) = together(plan, *output, options) else { continue };
+            let Some(vectors) = both.program.pays(straight, options) else { continue };
             if options.arithmetic == Arithmetic::Fast {
                 *straight = both.program.apart;
             }
-            self.together.push((output.name(), both.program.program));
+            self.together.push((output.name(), both.program.program, vectors));
         }
         self
     }

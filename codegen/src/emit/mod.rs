@@ -21,7 +21,7 @@ use crate::code::{Code, Programs};
 use crate::options::Options;
 use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
-use crate::rolled::RolledProgram;
+use crate::rolled::{RolledProgram, Vectors};
 use head::Head;
 use modes::Contacts;
 use signature::Signature;
@@ -81,13 +81,13 @@ pub fn source(input: &Input) -> String {
         if let (Some(contacts), true) = (&contacts, function.first) {
             contacts.dispatch(&mut out, &Signature::new(function.program.spec, &programs.sizes));
         }
-        let together = programs.together.iter().find(|(name, _)| *name == kernel.signature.name);
+        let together = programs.together.iter().find(|(name, ..)| *name == kernel.signature.name);
         write_function(
             &mut out,
             function.plan,
             options,
             function.program,
-            together.map(|(_, program)| program),
+            together.map(|(_, program, vectors)| (program, *vectors)),
             kernel,
         );
     }
@@ -158,7 +158,7 @@ fn write_function(
     plan: &Plan,
     options: &Options,
     program: &OutputProgram<Code>,
-    together: Option<&RolledProgram>,
+    together: Option<(&RolledProgram, Vectors)>,
     lanes::Kernel { id, signature, ports }: &lanes::Kernel,
 ) {
     let _ = write!(out, "\n{}", signature.documentation());
@@ -168,9 +168,11 @@ fn write_function(
     let head = Head { options, id: *id, signature, ports, inputs: &program.inputs };
     match &program.program {
         Code::Rolled(program) => rolled::RolledWriter::new(plan, program, head).write(out),
-        Code::Straight(program) => straight::Straight::new(plan, program, head).write(out, together.is_some()),
+        Code::Straight(program) => {
+            straight::Straight::new(plan, program, head).write(out, together.map(|(_, vectors)| vectors))
+        }
     }
-    if let Some(together) = together {
+    if let Some((together, _)) = together {
         let head = Head { options, id: *id, signature, ports, inputs: &program.inputs };
         together::TogetherWriter::new(plan, together, head).write(out);
     }

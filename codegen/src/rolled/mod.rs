@@ -29,7 +29,7 @@ pub use cost::cost;
 pub use mbd_runtime::sweep::pass::SweepDirection;
 pub use runs::{find, Run};
 pub use siblings::WIDTH;
-pub use together::{together, Together};
+pub use together::{together, Together, Vectors};
 
 /// Nodes in the shortest run that becomes a loop where the plan allows one.
 const LEAST: usize = 6;

@@ -1,6 +1,6 @@
 //! Like branches of one node computed at the same time, one in each lane of a vector register, for one state.
 
-use super::{build, siblings, RolledProgram};
+use super::{build, siblings, RolledProgram, WIDTH};
 use crate::options::{Arithmetic, LikeBranches, Options};
 use crate::output::{Output, OutputProgram};
 use crate::plan::{Plan, RowsThatAct};
@@ -43,15 +43,41 @@ const WORTH: f64 = 0.8;
 /// Fewest instructions of straight-line code, below which sums and inputs take most of the time.
 const LEAST: usize = 300;
 
+/// Numbers of double precision in a vector register of any target, and in one of AVX2.
+const REGISTERS: [usize; 2] = [2, 4];
+
+/// Where like branches are computed together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Vectors {
+    /// On every target that has vector instructions.
+    Any,
+    /// With vectors of 32 bytes only, because pairs of branches fill half of the lanes.
+    Wide,
+}
+
 impl Together {
-    /// Whether it is to replace straight-line code for one state.
-    pub fn pays(&self, straight: &Program, options: &Options) -> bool {
-        let instructions: usize = self.program.blocks.iter().map(|block| block.program.instructions()).sum();
-        let (together, apart) = (instructions as f64, straight.instructions());
+    /// Where it is to replace straight-line code for one state, if anywhere. Exact code is the same on all targets, and
+    /// made for the smallest registers.
+    pub fn pays(&self, straight: &Program, options: &Options) -> Option<Vectors> {
+        let together = |lanes: usize| {
+            let blocks = self.program.blocks.iter().map(|block| {
+                let parts = if block.repeat.is_some() { WIDTH.div_ceil(lanes) } else { 1 };
+                parts * block.program.instructions()
+            });
+            blocks.sum::<usize>() as f64
+        };
+        if options.plan.branches == LikeBranches::Together {
+            return Some(Vectors::Any);
+        }
         // Bodies of loops are not written in parts; scopes in scopes beyond this are too deep for compilers.
         let longest = self.program.blocks.iter().map(|block| block.program.steps.len()).max().unwrap_or(0);
-        let fits = longest <= 2 * options.chunk.max(1000);
-        let saves = apart >= LEAST && together <= WORTH * apart as f64;
-        options.plan.branches == LikeBranches::Together || (fits && saves)
+        let apart = straight.instructions();
+        let fits = longest <= 2 * options.chunk.max(1000) && apart >= LEAST;
+        let [any, wide] = REGISTERS.map(|lanes| fits && together(lanes) <= WORTH * apart as f64);
+        match options.arithmetic {
+            _ if any => Some(Vectors::Any),
+            Arithmetic::Fast if wide => Some(Vectors::Wide),
+            Arithmetic::Fast | Arithmetic::Exact => None,
+        }
     }
 }
