@@ -107,12 +107,15 @@ pub fn partition(graph: &Graph, link: &Link<'_, '_>, run: &Run, live: &[bool], w
     let mut outputs: Vec<Vec<(ProgramResult, Target)>> = vec![Vec::new(); passes];
     let mut places = BTreeMap::new();
     // What branches hand to their parent stays in their rows.
-    let mut handed = BTreeSet::new();
+    let (mut handed, mut handed_by) = (BTreeSet::new(), BTreeMap::new());
     for (pass, carried) in link.passes.iter().enumerate() {
         let mut number = 0;
         let outgoing = carried.outgoing.iter().zip(&wanted.carried[pass]);
         for (e, _) in outgoing.filter(|(_, wanted)| run.branches.is_some() && **wanted) {
-            handed.extend(if let Expr::Node { id, .. } = *e { Some(id) } else { None });
+            if let Expr::Node { id, .. } = *e {
+                handed.insert(id);
+                handed_by.entry(id).or_insert(pass);
+            }
         }
         for (k, incoming) in carried.incoming.iter().enumerate() {
             let Expr::Node { id, .. } = *incoming else { continue };
@@ -139,8 +142,14 @@ pub fn partition(graph: &Graph, link: &Link<'_, '_>, run: &Run, live: &[bool], w
     let mut cut = Cut { graph, ranks: &ranks, live, passes, outputs: &outputs, handed, sunk: BTreeSet::new() };
     let crossing = cut.settle();
     let rows: BTreeMap<u32, usize> = crossing.iter().enumerate().map(|(row, id)| (*id, row)).collect();
-    let place = |pass: Option<usize>, id: u32| match (graph.get(id).0, places.get(&id), columns.get(&id), rows.get(&id))
-    {
+    // Inputs are at hand in every pass; a branch may hand one of them to its parent.
+    let given = |id: u32| ranks[id as usize] == Rank::State && matches!(graph.get(id).0, Op::Input(_));
+    let place = |pass: Option<usize>, id: u32| match (
+        graph.get(id).0,
+        places.get(&id),
+        columns.get(&id),
+        rows.get(&id).filter(|_| !given(id)),
+    ) {
         (_, Some(place), _, _) if pass.map(Rank::Pass) == Some(ranks[id as usize]) => *place,
         (_, _, Some(column), _) => Place::Column(*column),
         (_, _, _, Some(row)) => Place::Row(*row),
@@ -171,7 +180,9 @@ pub fn partition(graph: &Graph, link: &Link<'_, '_>, run: &Run, live: &[bool], w
         let own = cut.own(pass);
         let mut results = outputs.clone();
         let taken_in = |id: u32| ranks[id as usize] == Rank::Pass(pass) && matches!(graph.get(id).0, Op::Input(_));
-        for (id, row) in rows.iter().filter(|(id, _)| own.contains(id) || taken_in(**id)) {
+        for (id, row) in
+            rows.iter().filter(|(id, _)| own.contains(id) || taken_in(**id) || (given(**id) && handed_by[*id] == pass))
+        {
             results.push((ProgramResult::Node(*id, false), Target::Row(*row)));
         }
         let (program, inputs, outputs) = assemble(graph, &own, |id| place(Some(pass), id), &results);
