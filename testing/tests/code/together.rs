@@ -171,8 +171,8 @@ fn random_trees() {
             branches += compare(&what, &model, &plan, &options(arithmetic, elimination));
         }
     }
-    // Of 2 to 6 branches in 60 trees, twice; fingers are in the branches that they belong to.
-    assert!(branches > 300, "only {branches} branches are computed together");
+    // The odd branch between them leaves some sets without equal distances.
+    assert!(branches > 200, "only {branches} branches are computed together");
 }
 
 #[test]
