@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use multibody::codegen::options::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
 use multibody::codegen::read::{Base, ImportOptions};
-use multibody::codegen::{self, Arithmetic, Options, Output, Precision, RolledCode};
+use multibody::codegen::{self, Arithmetic, LikeBranches, Options, Output, Precision, RolledCode};
 use serde::Deserialize;
 
 use super::args::{type_name, DEFAULT_RUNTIME};
@@ -42,6 +42,7 @@ struct Entry {
     elimination: Option<String>,
     #[serde(alias = "loops")]
     rolled: Option<String>,
+    branches: Option<String>,
     efforts: Option<bool>,
     frames: Option<Vec<String>>,
     snap: Option<f64>,
@@ -95,7 +96,7 @@ fn read(path: &Path) -> Outcome<Manifest> {
 }
 
 const KEYS: &str = "a manifest has `runtime` and [[file]] tables with `file`, `model`, `type`, `outputs`, and perhaps \
-                    `base`, `gravity`, `scalar`, `arithmetic`, `elimination`, `rolled`, `efforts`, `frames`, `snap`, `chunk`, `modes`";
+                    `base`, `gravity`, `scalar`, `arithmetic`, `elimination`, `rolled`, `branches`, `efforts`, `frames`, `snap`, `chunk`, `modes`";
 
 /// The text that a file should have.
 fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> Outcome<String> {
@@ -122,6 +123,7 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
             snap: entry.snap.unwrap_or(DEFAULT_SNAP),
             elimination: choice("elimination", &entry.elimination, EliminationStrategy::from_name).map_err(wrong)?,
             rolled: choice("rolled", &entry.rolled, RolledCode::from_name).map_err(wrong)?,
+            branches: choice("branches", &entry.branches, LikeBranches::from_name).map_err(wrong)?,
             ..PlanOptions::default()
         },
         runtime: runtime.to_string(),

@@ -6,10 +6,10 @@ use mbd_runtime::contact::{rows_that_act, Mode};
 
 use crate::error::GenerateError;
 use crate::modes::{ModeChoice, OF_EACH_SET};
-use crate::options::{Options, Precision};
+use crate::options::{Arithmetic, Options, Precision};
 use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
-use crate::rolled::{rolled, RolledProgram};
+use crate::rolled::{rolled, together, RolledProgram, Vectors};
 use crate::symbolic::{Counts, Op, Operand, Program, ProgramResult};
 use crate::trace::{chosen_frames, coordinate_rates, sizes, trace};
 
@@ -73,6 +73,8 @@ pub struct Programs {
     pub frames: Vec<usize>,
     /// Lengths of all arrays.
     pub sizes: Sizes,
+    /// Programs that compute like branches together for one state, by the names of their outputs.
+    pub together: Vec<(&'static str, RolledProgram, Vectors)>,
     /// Programs of the outputs in [`OF_EACH_SET`] for sets of modes of contacts.
     pub sets: Vec<SetPrograms>,
 }
@@ -103,6 +105,7 @@ impl Programs {
             coordinate_rates: rates.then(|| coordinate_rates(plan, options).map(Code::Straight)),
             sizes: sizes(plan, options, frames.len()),
             frames,
+            together: Vec::new(),
             sets: Vec::new(),
         })
     }
@@ -129,6 +132,22 @@ impl Programs {
             programs.sets.push(SetPrograms { modes, plan, outputs });
         }
         Ok(programs)
+    }
+
+    /// Computes like branches together for one state where that is faster. Straight-line code gets the same statements,
+    /// so that a lane has the bits of a single state.
+    #[must_use]
+    pub fn with_like_branches(mut self, plan: &Plan, options: &Options) -> Programs {
+        for (output, program) in options.outputs.iter().zip(&mut self.outputs) {
+            let Code::Straight(straight) = &mut program.program else { continue };
+            let Some(both) = together(plan, *output, options) else { continue };
+            let Some(vectors) = both.program.pays(straight, options) else { continue };
+            if options.arithmetic == Arithmetic::Fast {
+                *straight = both.program.apart;
+            }
+            self.together.push((output.name(), both.program.program, vectors));
+        }
+        self
     }
 
     /// The programs of all functions.

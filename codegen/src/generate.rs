@@ -9,7 +9,7 @@ pub use crate::emit::quantity;
 pub use crate::error::GenerateError;
 use crate::model::Model;
 use crate::modes::OF_EACH_SET;
-pub use crate::options::{Arithmetic, Options, Precision, RolledCode};
+pub use crate::options::{Arithmetic, LikeBranches, Options, Precision, RolledCode};
 pub use crate::output::{InputArray, Output, OutputProgram};
 use crate::plan::Plan;
 use crate::search;
@@ -51,7 +51,7 @@ pub fn generate(model: &Model, options: &Options) -> Result<Generated, GenerateE
 /// The same as of [`generate`].
 pub fn generate_from(plan: &Plan, options: &Options) -> Result<Generated, GenerateError> {
     let (plan, programs) = match &options.modes {
-        None => (plan.clone(), Programs::new(plan, options)?),
+        None => (plan.clone(), Programs::new(plan, options)?.with_like_branches(plan, options)),
         Some(choice) => {
             let full = plan.with_contacts();
             (full.masked(), Programs::of_modes(&full, choice, options)?)

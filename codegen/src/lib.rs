@@ -38,7 +38,7 @@ pub mod wasm;
 pub use import::words;
 
 pub use generate::{
-    generate, transfer_code, Arithmetic, CountsOfModes, GenerateError, Generated, Options, Output, Precision,
-    RolledCode,
+    generate, transfer_code, Arithmetic, CountsOfModes, GenerateError, Generated, LikeBranches, Options, Output,
+    Precision, RolledCode,
 };
 pub use names::camel_case;

@@ -48,6 +48,18 @@ choice! {
 }
 
 choice! {
+    /// Where like branches of one body (legs, arms) are computed at the same time, for one state.
+    pub enum LikeBranches {
+        /// Where that is faster, output by output.
+        Auto = "auto",
+        /// Wherever there are like branches.
+        Together = "together",
+        /// Nowhere: branch by branch.
+        Apart = "apart",
+    }
+}
+
+choice! {
     /// Strategy by which the elimination of the joints is chosen.
     pub enum EliminationStrategy {
         /// Branch by branch the elimination for which the rates take the least time for one state, by the cost model,
@@ -79,6 +91,8 @@ pub struct PlanOptions {
     pub mass_matrix: bool,
     /// Where rolled code is used for runs of like links.
     pub rolled: RolledCode,
+    /// Where like branches are computed together.
+    pub branches: LikeBranches,
 }
 
 impl Default for PlanOptions {
@@ -89,6 +103,7 @@ impl Default for PlanOptions {
             accelerations: true,
             mass_matrix: true,
             rolled: RolledCode::default(),
+            branches: LikeBranches::default(),
         }
     }
 }

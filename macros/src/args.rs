@@ -3,7 +3,7 @@
 use mbd_codegen::options::EliminationStrategy;
 use mbd_codegen::read::Base;
 use mbd_codegen::words::{did_you_mean, list, quote};
-use mbd_codegen::{Arithmetic, Options, Output, Precision, RolledCode};
+use mbd_codegen::{Arithmetic, LikeBranches, Options, Output, Precision, RolledCode};
 use proc_macro2::{Delimiter, Ident, Span, TokenStream, TokenTree};
 
 use crate::literal;
@@ -82,7 +82,7 @@ pub enum Modes {
     Listed(String),
 }
 
-const KEYS: [&str; 19] = [
+const KEYS: [&str; 20] = [
     "path",
     "name",
     "variant",
@@ -92,6 +92,7 @@ const KEYS: [&str; 19] = [
     "arithmetic",
     "elimination",
     "rolled",
+    "branches",
     "base",
     "gravity",
     "efforts",
@@ -201,6 +202,9 @@ impl Args {
             }
             "rolled" | "loops" => {
                 self.options.plan.rolled = choice(&word, value, &RolledCode::ALL.map(|r| (r.name(), r)))?;
+            }
+            "branches" => {
+                self.options.plan.branches = choice(&word, value, &LikeBranches::ALL.map(|b| (b.name(), b)))?;
             }
             "base" => {
                 self.base = Some((choice("base", value, &Base::ALL.map(|b| (b.name(), b)))?, place(value)));

@@ -63,6 +63,13 @@ impl Arithmetic for Fused {
     }
 }
 
+/// Whether the target has vector instructions that kernels for one state use, where they compute like branches of a
+/// mechanism at the same time. Without `std`, code is small instead.
+pub const VECTORS: bool = cfg!(feature = "std");
+
+/// Whether vectors are of 32 bytes where the arithmetic is fused.
+pub const WIDE_VECTORS: bool = cfg!(all(feature = "std", target_arch = "x86_64"));
+
 /// Body number `ID` of a generated type, for `L` lanes.
 ///
 /// `run` must be `#[inline(always)]`: it is then compiled as part of its caller, for the instructions that the caller

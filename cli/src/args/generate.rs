@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use multibody::codegen::options::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
 use multibody::codegen::output;
-use multibody::codegen::{camel_case, Arithmetic, Options, Output, Precision, RolledCode};
+use multibody::codegen::{camel_case, Arithmetic, LikeBranches, Options, Output, Precision, RolledCode};
 
 use super::values::{choice, outputs, rust_path, snap, type_name};
 use super::ModelArgs;
@@ -28,6 +28,9 @@ pub struct CodeArgs {
     /// Where code is rolled: a loop over like links in place of straight-line code
     #[arg(long, alias = "loops", value_parser = choice!(RolledCode), default_value = RolledCode::default().name())]
     pub rolled: RolledCode,
+    /// Where like branches (legs, arms) are computed at the same time for one state
+    #[arg(long, value_parser = choice!(LikeBranches), default_value = LikeBranches::default().name())]
+    pub branches: LikeBranches,
     /// Without joint forces, which are then zero and cost nothing
     #[arg(long)]
     pub no_efforts: bool,
@@ -78,6 +81,7 @@ impl CodeArgs {
                 snap: self.snap,
                 elimination: self.elimination,
                 rolled: self.rolled,
+                branches: self.branches,
                 ..PlanOptions::default()
             },
             chunk: self.chunk as usize,

@@ -11,6 +11,7 @@ pub(crate) mod numbers;
 mod rolled;
 mod signature;
 mod straight;
+mod together;
 mod traits;
 pub(crate) mod transfer;
 
@@ -20,6 +21,7 @@ use crate::code::{Code, Programs};
 use crate::options::Options;
 use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
+use crate::rolled::{RolledProgram, Vectors};
 use head::Head;
 use modes::Contacts;
 use signature::Signature;
@@ -79,7 +81,15 @@ pub fn source(input: &Input) -> String {
         if let (Some(contacts), true) = (&contacts, function.first) {
             contacts.dispatch(&mut out, &Signature::new(function.program.spec, &programs.sizes));
         }
-        write_function(&mut out, function.plan, options, function.program, kernel);
+        let together = programs.together.iter().find(|(name, ..)| *name == kernel.signature.name);
+        write_function(
+            &mut out,
+            function.plan,
+            options,
+            function.program,
+            together.map(|(_, program, vectors)| (program, *vectors)),
+            kernel,
+        );
     }
     // Several states would have to be in the same modes of contacts.
     let lanes = contacts.is_none();
@@ -148,6 +158,7 @@ fn write_function(
     plan: &Plan,
     options: &Options,
     program: &OutputProgram<Code>,
+    together: Option<(&RolledProgram, Vectors)>,
     lanes::Kernel { id, signature, ports }: &lanes::Kernel,
 ) {
     let _ = write!(out, "\n{}", signature.documentation());
@@ -157,6 +168,12 @@ fn write_function(
     let head = Head { options, id: *id, signature, ports, inputs: &program.inputs };
     match &program.program {
         Code::Rolled(program) => rolled::RolledWriter::new(plan, program, head).write(out),
-        Code::Straight(program) => straight::Straight::new(plan, program, head).write(out),
+        Code::Straight(program) => {
+            straight::Straight::new(plan, program, head).write(out, together.map(|(_, vectors)| vectors))
+        }
+    }
+    if let Some((together, _)) = together {
+        let head = Head { options, id: *id, signature, ports, inputs: &program.inputs };
+        together::TogetherWriter::new(plan, together, head).write(out);
     }
 }

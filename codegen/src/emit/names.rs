@@ -89,6 +89,10 @@ impl Names {
             (None, _) => "ground".to_string(),
             (Some(i), None) => identifier(&plan.nodes[i].name),
             (Some(0), Some(_)) => "inner".to_string(),
+            // Branches are named after the first of them.
+            (Some(i), Some(r)) if !program.loops[r.run].branches.is_empty() => {
+                identifier(&plan.nodes[program.loops[r.run].nodes.start + i - 1].name)
+            }
             (Some(_), Some(r)) if program.loops[r.run].period == 1 => "link".to_string(),
             (Some(i), Some(_)) => format!("link{i}"),
         };
@@ -98,6 +102,7 @@ impl Names {
             Place::Column(column) => format!("table_{column}"),
             Place::Row(row) => format!("row_{row}"),
             Place::Carried(k) => format!("carried_{k}"),
+            Place::RowOfBranch { turn, row, .. } => format!("branch{turn}_row_{row}"),
         };
         self.of(&block.program, body, source)
     }

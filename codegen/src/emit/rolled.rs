@@ -371,7 +371,8 @@ impl<'a> RolledWriter<'a> {
                 format!("row{from}[{at}][l]")
             }
             Place::Carried(k) => format!("carried{k}[l]"),
-            place => self.given_input(place).unwrap_or_default(),
+            Place::Given(_) | Place::GivenOfTurn { .. } => self.given_input(place).unwrap_or_default(),
+            Place::RowOfBranch { .. } => unreachable!("like branches have a writer of their own"),
         }
     }
 }

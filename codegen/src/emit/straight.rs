@@ -10,7 +10,9 @@ use std::fmt::Write;
 
 use super::head::Head;
 use super::names::{heading, Names};
+use super::together::TogetherWriter;
 use crate::plan::Plan;
+use crate::rolled::Vectors;
 use crate::symbolic::angles::{nodes, Angles, Pairs};
 use crate::symbolic::{Label, Op, Program, ProgramResult};
 
@@ -40,10 +42,22 @@ impl<'a> Straight<'a> {
         Straight { plan, head, program, names, angles: Angles::new(program) }
     }
 
-    /// Writes the function and its kernel.
-    pub fn write(&self, out: &mut String) {
+    /// Writes the function and its kernel, which leaves one state to the function for like branches `together`, if there
+    /// is one.
+    pub fn write(&self, out: &mut String, together: Option<Vectors>) {
         let statements = self.program.steps.iter().filter(|(_, op, _)| !matches!(op, Op::Input(_))).count();
         self.head.write(out, statements);
+        if let Some(vectors) = together {
+            let arguments: Vec<&str> = self.head.ports.iter().map(|port| port.name).collect();
+            let (rt, name) = (&self.head.options.runtime, TogetherWriter::name(&self.head.signature.name));
+            let call = format!("return Self::{name}::<A>({});", arguments.join(", "));
+            let condition = match vectors {
+                Vectors::Any => "VECTORS",
+                Vectors::Wide => "WIDE_VECTORS && A::FUSED",
+            };
+            let _ =
+                writeln!(out, "        if LANES == 1 && {rt}::kernel::{condition} {{\n            {call}\n        }}");
+        }
         self.write_sines(out);
         self.write_given(out);
         let n = self.program.outputs.len();

@@ -45,6 +45,9 @@ impl<I: Instructions> Lowering<'_, I> {
                 Place::fixed(array, at)
             }
             (Source::Kept(at), _) => Place::fixed(Array::Kept, at),
+            (Source::RowOfBranch { run, turn, row }, _) => {
+                Place::fixed(Array::Rows(run), turn * program.loops[run].row + row)
+            }
             (Source::GivenOfTurn { first, stride }, Some(turn)) => {
                 let (array, at) = self.inputs[first];
                 Place::moving(array, at, turn.k, stride)

@@ -6,10 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use mbd_runtime::tree::{Source, Tree};
 
 use super::link::Link;
-use super::main_line::MainLine;
+use super::main_line::{Event, MainLine};
 use super::partition::{assemble, output, partition, Body, Requests};
 use super::pass_state::{OutputSweeps, PassState};
-use super::runs::{find, Run};
+use super::runs::Run;
 use super::{Block, Loop, Place, Repeat, RolledProgram, Start, Target};
 use crate::options::Options;
 use crate::output::{Dim, InputArray, Output, OutputProgram};
@@ -17,8 +17,13 @@ use crate::plan::Plan;
 use crate::symbolic::{passes, Expr, Graph, Op, Operand, ProgramResult};
 use crate::trace::{rewrite, sizes, tolerance, SymbolicInputs};
 
-/// Builds the loop form; `None` where no run is long enough.
-pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Option<OutputProgram<RolledProgram>> {
+/// Builds the loop form with the runs that `find` finds among the nodes that are allowed; `None` where there are none.
+pub fn build(
+    plan: &Plan,
+    group: Output,
+    options: &Options,
+    find: impl Fn(&Tree<Expr>, &[bool]) -> Vec<Run>,
+) -> Option<OutputProgram<RolledProgram>> {
     let sweeps = OutputSweeps::of(group)?;
     let graph = Graph::default();
     let given = SymbolicInputs::new(&graph, plan, group.spec(), options);
@@ -31,7 +36,7 @@ pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Opt
     };
     let passes = sweeps.passes(&tree)?;
     let allowed: Vec<bool> = plan_of_tree.nodes.iter().map(|n| n.rolled).collect();
-    let runs: Vec<Run> = find(&tree, &allowed, least).into_iter().filter(|run| steady(&tree, run)).collect();
+    let runs: Vec<Run> = find(&tree, &allowed).into_iter().filter(|run| steady(&tree, run)).collect();
     if runs.is_empty() {
         return None;
     }
@@ -41,9 +46,16 @@ pub fn build(plan: &Plan, group: Output, options: &Options, least: usize) -> Opt
     let mut links: Vec<Link> = graphs.iter().zip(&runs).map(link).collect::<Option<_>>()?;
     let next_input = given.arrays.iter().map(InputArray::len).sum();
     let stage = PassState::new(group, &graph, tree, &passes)?;
-    let mut line = MainLine { graph: &graph, stage, given, runs: &runs, events: Vec::new(), next_input };
+    let mut line =
+        MainLine { graph: &graph, stage, given, runs: &runs, events: Vec::new(), next_input, passed_on: false };
     for (number, pass) in passes.iter().enumerate() {
         line.pass(number, pass.direction, &mut links);
+    }
+    // What adds up over all nodes has an order, in which branches do not wait for each other.
+    let mut adds_up = false;
+    (0..passes.len()).for_each(|pass| line.stage.running(pass, &line.given, |_| adds_up = true));
+    if (adds_up || line.passed_on) && runs.iter().any(|run| run.branches.is_some()) {
+        return None;
     }
     let results = line.stage.finish(&line.given);
     let own: Vec<Vec<(Expr, Target)>> = links
@@ -65,6 +77,9 @@ fn state_of(tree: &Tree<Expr>, i: usize) -> (usize, usize) {
 
 /// Whether coordinates move on by the same number from turn to turn.
 fn steady(tree: &Tree<Expr>, run: &Run) -> bool {
+    if run.branches.is_some() {
+        return true;
+    }
     let sizes = |i: usize| (tree.nodes[i].kind.nq(), tree.nodes[i].kind.nv());
     let mut at = state_of(tree, run.nodes.start);
     run.nodes.clone().all(|i| {
@@ -88,14 +103,14 @@ fn results_of_turn<'g>(
     let mut results = link.finish().into_iter();
     for array in group.spec().results {
         let turn = match array.dims {
-            [Dim::Nq] => Some((start.0, link.size.0)),
-            [Dim::Nv] => Some((start.1, link.size.1)),
+            [Dim::Nq] => Some((start.0, link.size.0, link.stride.0)),
+            [Dim::Nv] => Some((start.1, link.size.1, link.stride.1)),
             _ => None,
         };
         let len = array.len(&sizes);
         match turn {
-            Some((first, n)) => {
-                let target = |k| Target::ResultOfTurn { first: offset + first + k, stride: n };
+            Some((first, n, stride)) => {
+                let target = |k| Target::ResultOfTurn { first: offset + first + k, stride };
                 targets.extend(results.by_ref().take(n).zip((0..n).map(target)));
             }
             // What belongs to no turn.
@@ -106,24 +121,24 @@ fn results_of_turn<'g>(
     targets
 }
 
-struct Build<'b, 'm, 'g> {
-    line: &'b MainLine<'m, 'b>,
-    graphs: &'g [Graph],
-    links: &'b [Link<'g, 'b>],
+pub(super) struct Build<'b, 'm, 'g> {
+    pub(super) line: &'b MainLine<'m, 'b>,
+    pub(super) graphs: &'g [Graph],
+    pub(super) links: &'b [Link<'g, 'b>],
     starts: &'b [(usize, usize)],
     own: Vec<Vec<(Expr<'g>, Target)>>,
     results: Vec<Expr<'m>>,
 }
 
 /// What is needed.
-struct Live {
-    main: Vec<bool>,
-    links: Vec<Vec<bool>>,
+pub(super) struct Live {
+    pub(super) main: Vec<bool>,
+    pub(super) links: Vec<Vec<bool>>,
     /// Places of what run and pass carry.
-    carried: Vec<Vec<Vec<bool>>>,
+    pub(super) carried: Vec<Vec<Vec<bool>>>,
 }
 
-fn mark(graph: &Graph, live: &mut [bool], e: Expr) {
+pub(super) fn mark(graph: &Graph, live: &mut [bool], e: Expr) {
     let Expr::Node { id, .. } = e else { return };
     let mut open = vec![id];
     while let Some(id) = open.pop() {
@@ -150,7 +165,8 @@ impl<'m> Build<'_, 'm, '_> {
     }
 
     fn live(&self) -> Live {
-        let passes = |link: &Link| link.passes.iter().map(|p| vec![false; p.incoming.len()]).collect();
+        let passes =
+            |link: &Link| link.passes.iter().map(|p| vec![false; p.incoming.len().max(p.outgoing.len())]).collect();
         let mut live = Live {
             main: vec![false; self.line.graph.len()],
             links: self.graphs.iter().map(|g| vec![false; g.len()]).collect(),
@@ -165,6 +181,7 @@ impl<'m> Build<'_, 'm, '_> {
             for event in self.line.events.iter().rev() {
                 let (link, graph) = (&self.links[event.run], &self.graphs[event.run]);
                 let pass = &link.passes[event.pass];
+                settled &= !self.live_in_branches(event, &mut live);
                 for (k, (start, end)) in event.start.iter().zip(&event.end).enumerate() {
                     let read = |e: Expr, live: &[bool]| matches!(e, Expr::Node { id, .. } if live[id as usize]);
                     let wanted = read(*end, &live.main) || read(pass.incoming[k], &live.links[event.run]);
@@ -185,6 +202,7 @@ impl<'m> Build<'_, 'm, '_> {
         let live = self.live();
         let mut loops = Vec::new();
         let mut bodies: Vec<BTreeMap<Option<usize>, Body>> = Vec::new();
+        let mut rows = Vec::new();
         for (k, run) in self.line.runs.iter().enumerate() {
             let given = &self.line.given;
             let (q, v) = self.starts[k];
@@ -194,11 +212,20 @@ impl<'m> Build<'_, 'm, '_> {
                 first: [q, given.q.len() + v, given.first_of("a") + v, given.first_of("tau") + v],
             };
             let code = partition(&self.graphs[k], &self.links[k], run, &live.links[k], &wanted);
-            loops.push(Loop { nodes: run.nodes.clone(), period: run.period, table: code.table, row: code.row });
+            let branches = run.branches.as_ref().map_or(Vec::new(), |branches| branches.roots.clone());
+            loops.push(Loop {
+                nodes: run.nodes.clone(),
+                period: run.period,
+                table: code.table,
+                row: code.row,
+                branches,
+            });
+            rows.push(code.rows);
             bodies.push(code.bodies.into_iter().map(|b| (b.pass, b)).collect());
         }
         let units = self.units(&live);
         let (kept, slots) = self.slots(&units, &live);
+        let handed = self.handed(&rows);
         let mut blocks = Vec::new();
         for (k, bodies) in bodies.iter_mut().enumerate() {
             if let Some(b) = bodies.remove(&None) {
@@ -208,10 +235,13 @@ impl<'m> Build<'_, 'm, '_> {
         }
         for unit in &units {
             match unit {
-                Unit::Straight(own) => blocks.extend(self.straight(own, &slots, unit_is_last(unit, &units))),
+                Unit::Straight(own) => blocks.extend(self.straight(own, &slots, &handed, unit_is_last(unit, &units))),
                 Unit::Loop(event) => {
                     let event = &self.line.events[*event];
                     let Some(b) = bodies[event.run].remove(&Some(event.pass)) else { continue };
+                    if b.outputs.is_empty() {
+                        continue;
+                    }
                     let carried = self.carried(event, &live, &slots);
                     let repeat = Some(Repeat { run: event.run, way: Some(event.direction), carried });
                     blocks.push(Block { program: b.program, inputs: b.inputs, outputs: b.outputs, repeat });
@@ -272,6 +302,13 @@ impl<'m> Build<'_, 'm, '_> {
                 Unit::Loop(event) => {
                     let event = &self.line.events[*event];
                     let needed = &live.carried[event.run][event.pass];
+                    if self.line.runs[event.run].branches.is_some() {
+                        for (start, _) in event.start.iter().zip(needed).filter(|(_, needed)| **needed) {
+                            if let Expr::Node { id, .. } = *start {
+                                read(id);
+                            }
+                        }
+                    }
                     for ((start, end), _) in event.start.iter().zip(&event.end).zip(needed).filter(|(_, n)| **n) {
                         if let Expr::Node { id, .. } = *start {
                             read(id);
@@ -306,7 +343,13 @@ impl<'m> Build<'_, 'm, '_> {
         (count, slots)
     }
 
-    fn straight(&self, own: &BTreeSet<u32>, slots: &BTreeMap<u32, usize>, is_last: bool) -> Option<Block> {
+    fn straight(
+        &self,
+        own: &BTreeSet<u32>,
+        slots: &BTreeMap<u32, usize>,
+        handed: &BTreeMap<u32, Place>,
+        is_last: bool,
+    ) -> Option<Block> {
         let mut outputs: Vec<(ProgramResult, Target)> = Vec::new();
         for (k, e) in self.results() {
             let here = match e {
@@ -327,7 +370,7 @@ impl<'m> Build<'_, 'm, '_> {
         let given: usize = self.line.given.arrays.iter().map(InputArray::len).sum();
         let place = |id: u32| match self.line.graph.get(id).0 {
             Op::Input(k) if (k as usize) < given => Place::Given(k as usize),
-            _ => Place::Kept(slots[&id]),
+            _ => handed.get(&id).copied().unwrap_or_else(|| Place::Kept(slots[&id])),
         };
         if outputs.is_empty() {
             return None;
@@ -336,15 +379,12 @@ impl<'m> Build<'_, 'm, '_> {
         Some(Block { program, inputs, outputs, repeat: None })
     }
 
-    fn carried(
-        &self,
-        event: &super::main_line::Event<'_>,
-        live: &Live,
-        slots: &BTreeMap<u32, usize>,
-    ) -> Vec<(Start, Option<usize>)> {
+    fn carried(&self, event: &Event<'_>, live: &Live, slots: &BTreeMap<u32, usize>) -> Vec<(Start, Option<usize>)> {
         let incoming = &self.links[event.run].passes[event.pass].incoming;
         let needed = &live.carried[event.run][event.pass];
-        let places = event.start.iter().zip(&event.end).zip(incoming.iter().zip(needed));
+        // Branches hand nothing on to each other.
+        let ends = event.end.iter().map(Some).chain(std::iter::repeat(None));
+        let places = event.start.iter().zip(ends).zip(incoming.iter().zip(needed));
         places
             .filter(|(_, (incoming, needed))| **needed && matches!(incoming, Expr::Node { .. }))
             .map(|((start, end), _)| {
@@ -355,7 +395,10 @@ impl<'m> Build<'_, 'm, '_> {
                         _ => Start::Kept(slots[&id], neg),
                     },
                 };
-                let end = if let Expr::Node { id, .. } = *end { slots.get(&id).copied() } else { None };
+                let end = match end {
+                    Some(Expr::Node { id, .. }) => slots.get(id).copied(),
+                    _ => None,
+                };
                 (start, end)
             })
             .collect()

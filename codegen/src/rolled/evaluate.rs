@@ -33,6 +33,7 @@ impl RolledProgram {
                     Place::Column(c) => S::constant(self.loops[run.unwrap_or(0)].table[turn][c]),
                     Place::Row(k) => rows[run.unwrap_or(0)][turn][k],
                     Place::Carried(k) => carried[k],
+                    Place::RowOfBranch { run, turn, row } => rows[run][turn][row],
                 });
                 let values: Vec<S> = values.collect();
                 let outputs = block.program.evaluate(&values, fused);

@@ -10,6 +10,7 @@ use mbd_runtime::Scalar;
 
 use super::pass_state::{read, PassState};
 use super::runs::{map_node, Run, Slot};
+use super::turn_constants::constant;
 use super::SweepDirection;
 use crate::output::Output;
 use crate::symbolic::{Expr, Graph};
@@ -40,6 +41,8 @@ pub struct LinkPass<'g> {
     pub outgoing: Vec<Expr<'g>>,
     /// Where the negative is carried, because that is what a turn computes.
     pub negative: Vec<bool>,
+    /// Length of the graph after it.
+    pub end: usize,
 }
 
 /// One turn of a run on its way through the passes.
@@ -54,6 +57,8 @@ pub struct Link<'g, 'a> {
     pub passes: Vec<LinkPass<'g>>,
     /// Coordinates and velocities of one turn.
     pub size: (usize, usize),
+    /// By how much the first coordinate and the first velocity move on from turn to turn.
+    pub stride: (usize, usize),
 }
 
 impl<'g, 'a> Link<'g, 'a> {
@@ -74,17 +79,21 @@ impl<'g, 'a> Link<'g, 'a> {
         };
         let columns = symbols(&LinkInput::Column, run.table[0].len());
         let (mut nq, mut nv) = (0, 0);
-        let mut nodes = vec![dummy()];
+        let mut nodes = vec![dummy(run.branches.as_ref().is_some_and(|b| b.accumulates))];
         for (k, node) in run.template.iter().enumerate() {
             let mut node = map_node(node, &mut |slot| match slot {
                 Slot::Const(x) => Expr::Const(x),
                 Slot::Column(c) => columns[c],
             });
-            node.parent = Some(k);
-            node.source = Source::State { q: nq, v: nv };
-            (nq, nv) = (nq + node.kind.nq(), nv + node.kind.nv());
+            if run.branches.is_none() {
+                node.parent = Some(k);
+                node.source = Source::State { q: nq, v: nv };
+                (nq, nv) = (nq + node.kind.nq(), nv + node.kind.nv());
+            }
             nodes.push(node);
         }
+        let stride = run.branches.as_ref().map_or((nq, nv), |b| b.stride);
+        (nq, nv) = run.branches.as_ref().map_or((nq, nv), |b| b.size);
         let zero = Expr::zero();
         let given = SymbolicInputs {
             arrays: Vec::new(),
@@ -103,7 +112,11 @@ impl<'g, 'a> Link<'g, 'a> {
         let constraints: Vec<_> = tree.constraints.iter().map(|c| stand_in(c, run)).collect();
         // Numbered as in the tree; coordinates are open nowhere in a run.
         let row = |shared: &Unknown| if let Unknown::Row(_) = shared { *shared } else { Unknown::Row(0) };
-        let shared = if constraints.is_empty() { Vec::new() } else { tree.unknowns.iter().map(row).collect() };
+        let shared = match &run.branches {
+            Some(branches) => branches.unknowns.clone(),
+            None if constraints.is_empty() => Vec::new(),
+            None => tree.unknowns.iter().map(row).collect(),
+        };
         let tree = Tree {
             nodes,
             dims,
@@ -120,7 +133,8 @@ impl<'g, 'a> Link<'g, 'a> {
             matrix_depth: 0,
         };
         let stage = PassState::new(group, graph, tree, passes)?;
-        Some(Link { graph, stage, given, nodes: run.period, inputs, passes: Vec::new(), size: (nq, nv) })
+        let nodes = run.period;
+        Some(Link { graph, stage, given, nodes, inputs, passes: Vec::new(), size: (nq, nv), stride })
     }
 
     /// A pass, carrying in `first` at its first turn. What is constant there and stays so from turn to turn is a
@@ -164,7 +178,8 @@ impl<'g, 'a> Link<'g, 'a> {
                     return;
                 }
                 let outgoing = outgoing.into_iter().zip(&negative).map(|(e, negative)| signed(e, *negative)).collect();
-                self.passes.push(LinkPass { incoming: symbols_of(&incoming), outgoing, negative });
+                let end = self.graph.len();
+                self.passes.push(LinkPass { incoming: symbols_of(&incoming), outgoing, negative, end });
                 return;
             }
         }
@@ -200,6 +215,44 @@ impl<'g, 'a> Link<'g, 'a> {
         let mut out = read(|visit| stage.carried(pass, last, given, visit));
         out.extend(read(|visit| stage.running(pass, given, visit)));
         out
+    }
+
+    /// A pass through a branch: outward with what the parent hands to all branches, inward with what each hands to the
+    /// parent.
+    pub fn pass_of_branch(&mut self, pass: usize, direction: SweepDirection, from_parent: &[Expr<'_>]) {
+        let number = self.passes.len();
+        self.stage.begin(pass, &self.given);
+        let (given, outer) = (&self.given, self.nodes);
+        let (mut incoming, mut outgoing) = (Vec::new(), Vec::new());
+        match direction {
+            SweepDirection::BaseToTip => {
+                for (k, first) in from_parent.iter().enumerate() {
+                    self.inputs.push(LinkInput::Carried(number, k));
+                    let symbol = self.graph.input(self.inputs.len() - 1);
+                    incoming.push(if let Expr::Const(x) = *first { Expr::Const(x) } else { symbol });
+                }
+                let mut next = incoming.iter();
+                let mut next = || *next.next().expect("a pass takes in as much as the parent hands on");
+                self.stage.carried(pass, 0, given, |e| *e = next());
+                (1..=outer).for_each(|i| self.stage.node(pass, i, given));
+            }
+            SweepDirection::TipToBase => {
+                (1..=outer).rev().for_each(|i| self.stage.node(pass, i, given));
+                outgoing = read(|visit| self.stage.carried(pass, 0, given, visit));
+            }
+        }
+        let negative: Vec<bool> = outgoing.iter().map(|e| matches!(e, Expr::Node { neg: true, .. })).collect();
+        let outgoing = symbols_of(&outgoing);
+        self.passes.push(LinkPass { incoming, outgoing, negative, end: self.graph.len() });
+    }
+
+    /// What a pass hands on, as far as it depends on constants alone, in the turn with a given row of the table.
+    pub fn constants(&self, pass: usize, row: &[f64]) -> Vec<Option<f64>> {
+        let value = |e: &Expr<'g>| match *e {
+            Expr::Const(x) => Some(x),
+            Expr::Node { id, .. } => constant(self.graph, self, row, id),
+        };
+        self.passes[pass].outgoing.iter().map(value).collect()
     }
 
     /// Results of one turn, after the last pass.
@@ -240,7 +293,7 @@ fn stand_in<'g>(constraint: &Constraint<Expr<'_>>, run: &Run) -> Constraint<Expr
 }
 
 /// Stands for whatever is inboard of a turn: has no inertia, and is never stepped.
-fn dummy<'g>() -> Node<Expr<'g>> {
+fn dummy<'g>(accumulates_momentum: bool) -> Node<Expr<'g>> {
     Node {
         parent: None,
         place: Vec::new(),
@@ -253,6 +306,6 @@ fn dummy<'g>() -> Node<Expr<'g>> {
         slide: Expr::zero(),
         inertia: RigidInertia::zero(),
         passive: Vec::new(),
-        elimination: Elimination::default(),
+        elimination: Elimination { accumulates_momentum, ..Elimination::default() },
     }
 }

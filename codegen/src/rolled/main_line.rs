@@ -4,7 +4,8 @@ use super::link::Link;
 use super::pass_state::{read, PassState};
 use super::runs::Run;
 use super::SweepDirection;
-use crate::symbolic::{Expr, Graph};
+use crate::output::InputArray;
+use crate::symbolic::{Expr, Graph, Op};
 use crate::trace::SymbolicInputs;
 
 /// A pass over a run, as the rest of the tree sees it.
@@ -21,6 +22,8 @@ pub struct Event<'m> {
     pub start: Vec<Expr<'m>>,
     /// What the last turn carries out: symbols or constants.
     pub end: Vec<Expr<'m>>,
+    /// What every branch hands to the parent, where turns are branches; then `end` is empty.
+    pub handed: Vec<Vec<Expr<'m>>>,
 }
 
 /// Walks the tree and takes the links of the runs along.
@@ -37,6 +40,8 @@ pub struct MainLine<'m, 'a> {
     pub events: Vec<Event<'m>>,
     /// Number of the next symbol.
     pub next_input: usize,
+    /// Whether a branch takes in what another one hands over unchanged, which has no place between loops.
+    pub passed_on: bool,
 }
 
 impl<'m> MainLine<'m, '_> {
@@ -46,13 +51,18 @@ impl<'m> MainLine<'m, '_> {
         let n = self.stage.tree.nodes.len();
         match direction {
             SweepDirection::TipToBase => {
-                for run in self.runs {
+                for run in self.runs.iter().filter(|run| run.branches.is_none()) {
                     // The first turn adds the body itself.
                     self.stage.carried(pass, run.last(), &self.given, |e| *e = Expr::Const(0.0));
                 }
-                let mut runs = self.runs.iter().enumerate().rev().peekable();
+                let chains = |(_, run): &(usize, &Run)| run.branches.is_none();
+                let mut runs = self.runs.iter().enumerate().rev().filter(chains).peekable();
                 let mut i = n;
                 while i > 0 {
+                    if self.in_branch(i - 1, pass, direction, links) {
+                        i -= 1;
+                        continue;
+                    }
                     match runs.next_if(|(_, run)| run.nodes.end == i) {
                         Some((k, run)) => {
                             self.run(k, pass, direction, links);
@@ -66,9 +76,14 @@ impl<'m> MainLine<'m, '_> {
                 }
             }
             SweepDirection::BaseToTip => {
-                let mut runs = self.runs.iter().enumerate().peekable();
+                let chains = |(_, run): &(usize, &Run)| run.branches.is_none();
+                let mut runs = self.runs.iter().enumerate().filter(chains).peekable();
                 let mut i = 0;
                 while i < n {
+                    if self.in_branch(i, pass, direction, links) {
+                        i += 1;
+                        continue;
+                    }
                     match runs.next_if(|(_, run)| run.nodes.start == i) {
                         Some((k, run)) => {
                             self.run(k, pass, direction, links);
@@ -124,6 +139,76 @@ impl<'m> MainLine<'m, '_> {
             SweepDirection::BaseToTip => stage.carried(pass, to, given, |e| *e = next()),
         }
         stage.running(pass, given, |e| *e = next());
-        self.events.push(Event { at, run: k, pass: number, direction, start, end });
+        self.events.push(Event { at, run: k, pass: number, direction, start, end, handed: Vec::new() });
+    }
+
+    /// Whether node `i` is in a branch that has others like it. The first of their roots to be met takes all of them
+    /// through the pass, and from tip to base each root hands its share to the parent in its turn.
+    fn in_branch(&mut self, i: usize, pass: usize, direction: SweepDirection, links: &mut [Link<'_, '_>]) -> bool {
+        let set = self.runs.iter().enumerate().find_map(|(k, run)| {
+            let branches = run.branches.as_ref()?;
+            let turn = branches.roots.iter().position(|root| (*root..root + run.period).contains(&i))?;
+            Some((k, branches, turn))
+        });
+        let Some((k, branches, turn)) = set else { return false };
+        if i != branches.roots[turn] {
+            return true;
+        }
+        let met_first = match direction {
+            SweepDirection::TipToBase => branches.roots.len() - 1,
+            SweepDirection::BaseToTip => 0,
+        };
+        if turn == met_first {
+            let event = self.branches(k, branches.parent, pass, direction, &mut links[k]);
+            self.events.push(event);
+        }
+        let of_run = self.events.iter().rev().find(|event| event.run == k);
+        if let (SweepDirection::TipToBase, Some(event)) = (direction, of_run) {
+            let mut handed = event.handed[turn].iter();
+            let mut next = || *handed.next().expect("a branch hands on as much as its parent takes in");
+            self.stage.carried(pass, branches.parent, &self.given, |e| *e = *e + next());
+        }
+        true
+    }
+
+    fn branches(
+        &mut self,
+        k: usize,
+        parent: usize,
+        pass: usize,
+        direction: SweepDirection,
+        link: &mut Link<'_, '_>,
+    ) -> Event<'m> {
+        let (stage, given) = (&mut self.stage, &self.given);
+        let start = match direction {
+            SweepDirection::TipToBase => Vec::new(),
+            SweepDirection::BaseToTip => read(|visit| stage.carried(pass, parent, given, visit)),
+        };
+        let given: usize = self.given.arrays.iter().map(InputArray::len).sum();
+        self.passed_on |= start.iter().any(|e| match *e {
+            Expr::Node { id, .. } => matches!(self.graph.get(id).0, Op::Input(k) if k as usize >= given),
+            Expr::Const(_) => false,
+        });
+        let at = self.graph.len();
+        link.pass_of_branch(pass, direction, &start);
+        let number = link.passes.len() - 1;
+        let negative = &link.passes[number].negative;
+        let mut handed = Vec::new();
+        for row in &self.runs[k].table {
+            // What depends on constants alone is a constant here too.
+            let shares = link.constants(number, row).into_iter().zip(negative).map(|(constant, negative)| {
+                let end = constant.map(Expr::Const).unwrap_or_else(|| {
+                    self.next_input += 1;
+                    self.graph.input(self.next_input - 1)
+                });
+                if *negative {
+                    -end
+                } else {
+                    end
+                }
+            });
+            handed.push(shares.collect());
+        }
+        Event { at, run: k, pass: number, direction, start, end: Vec::new(), handed }
     }
 }

@@ -14,7 +14,11 @@ mod main_line;
 mod partition;
 mod pass_state;
 mod runs;
+mod share;
+mod siblings;
 mod sines;
+mod together;
+mod turn_constants;
 
 use std::collections::BTreeSet;
 
@@ -26,6 +30,8 @@ use crate::symbolic::{Counts, Program, ProgramResult};
 pub use cost::cost;
 pub use mbd_runtime::sweep::pass::SweepDirection;
 pub use runs::{find, Run};
+pub use siblings::WIDTH;
+pub use together::{together, Together, Vectors};
 
 /// Nodes in the shortest run that becomes a loop where the plan allows one.
 const LEAST: usize = 6;
@@ -51,8 +57,17 @@ pub enum Place {
     Column(usize),
     /// Number of the turn's row.
     Row(usize),
-    /// Carried from turn to turn.
+    /// Carried from turn to turn; the same in all turns where these are branches of one node.
     Carried(usize),
+    /// Number of the row of a branch, outside of its loop.
+    RowOfBranch {
+        /// Which run.
+        run: usize,
+        /// Which branch.
+        turn: usize,
+        /// Number of its row.
+        row: usize,
+    },
 }
 
 /// Where an output of a block goes.
@@ -128,6 +143,8 @@ pub struct Loop {
     pub table: Vec<Vec<f64>>,
     /// Numbers kept for each turn.
     pub row: usize,
+    /// First node of every branch where the turns are like branches of one node, which are computed at the same time.
+    pub branches: Vec<usize>,
 }
 
 /// An output group in loop form.
@@ -201,5 +218,5 @@ pub fn rolled(plan: &Plan, group: Output, options: &Options) -> Option<OutputPro
         RolledCode::Auto => LEAST,
         RolledCode::Always => LEAST_ALWAYS,
     };
-    build::build(plan, group, options, least)
+    build::build(plan, group, options, |tree, allowed| find(tree, allowed, least))
 }

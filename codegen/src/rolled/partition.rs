@@ -3,10 +3,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mbd_runtime::Scalar;
-
 use super::link::{Link, LinkInput};
 use super::runs::Run;
+use super::turn_constants::value;
 use super::{Place, Target};
 use crate::symbolic::{Expr, Graph, Op, Operand, Program, ProgramResult};
 
@@ -30,6 +29,8 @@ pub struct Code {
     pub table: Vec<Vec<f64>>,
     /// Numbers kept for each turn.
     pub row: usize,
+    /// The nodes that they are the values of.
+    pub rows: BTreeMap<u32, usize>,
 }
 
 /// What is wanted of a run.
@@ -61,7 +62,8 @@ pub fn output(e: Expr) -> ProgramResult {
     }
 }
 
-fn nodes(op: &Op) -> impl Iterator<Item = u32> {
+/// Nodes among the operands.
+pub fn nodes(op: &Op) -> impl Iterator<Item = u32> {
     op.operands().filter_map(|o| if let Operand::Node(id) = o { Some(id) } else { None })
 }
 
@@ -98,18 +100,29 @@ pub fn assemble(
 
 /// Cuts the graph of a turn.
 pub fn partition(graph: &Graph, link: &Link<'_, '_>, run: &Run, live: &[bool], wanted: &Requests<'_, '_>) -> Code {
-    let ranks = ranks(graph, link);
+    let ranks = if run.branches.is_some() { ranks_in_branch(graph, link) } else { ranks(graph, link) };
     let passes = link.passes.len();
     let (columns, table) = columns(graph, link, run, live, &ranks);
     // Outputs of every pass that leave the turn.
     let mut outputs: Vec<Vec<(ProgramResult, Target)>> = vec![Vec::new(); passes];
     let mut places = BTreeMap::new();
+    // What branches hand to their parent stays in their rows.
+    let (mut handed, mut handed_by) = (BTreeSet::new(), BTreeMap::new());
     for (pass, carried) in link.passes.iter().enumerate() {
         let mut number = 0;
-        for (k, (incoming, outgoing)) in carried.incoming.iter().zip(&carried.outgoing).enumerate() {
+        let outgoing = carried.outgoing.iter().zip(&wanted.carried[pass]);
+        for (e, _) in outgoing.filter(|(_, wanted)| run.branches.is_some() && **wanted) {
+            if let Expr::Node { id, .. } = *e {
+                handed.insert(id);
+                handed_by.entry(id).or_insert(pass);
+            }
+        }
+        for (k, incoming) in carried.incoming.iter().enumerate() {
             let Expr::Node { id, .. } = *incoming else { continue };
             if wanted.carried[pass][k] {
-                outputs[pass].push((output(*outgoing), Target::Carried(number)));
+                if run.branches.is_none() {
+                    outputs[pass].push((output(carried.outgoing[k]), Target::Carried(number)));
+                }
                 places.insert(id, Place::Carried(number));
                 number += 1;
             }
@@ -125,20 +138,27 @@ pub fn partition(graph: &Graph, link: &Link<'_, '_>, run: &Run, live: &[bool], w
         };
         outputs[pass].push((output(*e), *target));
     }
-    let mut cut = Cut { graph, ranks: &ranks, live, passes, outputs: &outputs, sunk: BTreeSet::new() };
+    handed.retain(|id| ranks[*id as usize] != Rank::Constant);
+    let mut cut = Cut { graph, ranks: &ranks, live, passes, outputs: &outputs, handed, sunk: BTreeSet::new() };
     let crossing = cut.settle();
     let rows: BTreeMap<u32, usize> = crossing.iter().enumerate().map(|(row, id)| (*id, row)).collect();
-    let place = |pass: Option<usize>, id: u32| match (graph.get(id).0, places.get(&id), columns.get(&id), rows.get(&id))
-    {
+    // Inputs are at hand in every pass; a branch may hand one of them to its parent.
+    let given = |id: u32| ranks[id as usize] == Rank::State && matches!(graph.get(id).0, Op::Input(_));
+    let place = |pass: Option<usize>, id: u32| match (
+        graph.get(id).0,
+        places.get(&id),
+        columns.get(&id),
+        rows.get(&id).filter(|_| !given(id)),
+    ) {
         (_, Some(place), _, _) if pass.map(Rank::Pass) == Some(ranks[id as usize]) => *place,
         (_, _, Some(column), _) => Place::Column(*column),
         (_, _, _, Some(row)) => Place::Row(*row),
         (Op::Input(k), ..) => {
             let (first, stride) = match link.inputs[k as usize] {
-                LinkInput::Q(k) => (wanted.first[0] + k, link.size.0),
-                LinkInput::Second(k) => (wanted.first[1] + k, link.size.1),
-                LinkInput::Third(k) => (wanted.first[2] + k, link.size.1),
-                LinkInput::Tau(k) => (wanted.first[3] + k, link.size.1),
+                LinkInput::Q(k) => (wanted.first[0] + k, link.stride.0),
+                LinkInput::Second(k) => (wanted.first[1] + k, link.stride.1),
+                LinkInput::Third(k) => (wanted.first[2] + k, link.stride.1),
+                LinkInput::Tau(k) => (wanted.first[3] + k, link.stride.1),
                 LinkInput::Column(_) | LinkInput::Carried(..) => {
                     unreachable!("constants and what is carried have places")
                 }
@@ -160,13 +180,15 @@ pub fn partition(graph: &Graph, link: &Link<'_, '_>, run: &Run, live: &[bool], w
         let own = cut.own(pass);
         let mut results = outputs.clone();
         let taken_in = |id: u32| ranks[id as usize] == Rank::Pass(pass) && matches!(graph.get(id).0, Op::Input(_));
-        for (id, row) in rows.iter().filter(|(id, _)| own.contains(id) || taken_in(**id)) {
+        for (id, row) in
+            rows.iter().filter(|(id, _)| own.contains(id) || taken_in(**id) || (given(**id) && handed_by[*id] == pass))
+        {
             results.push((ProgramResult::Node(*id, false), Target::Row(*row)));
         }
         let (program, inputs, outputs) = assemble(graph, &own, |id| place(Some(pass), id), &results);
         bodies.push(Body { pass: Some(pass), program, inputs, outputs });
     }
-    Code { bodies, table, row: rows.len() }
+    Code { bodies, table, row: rows.len(), rows }
 }
 
 fn ranks(graph: &Graph, link: &Link<'_, '_>) -> Vec<Rank> {
@@ -181,6 +203,31 @@ fn ranks(graph: &Graph, link: &Link<'_, '_>) -> Vec<Rank> {
             },
             op => nodes(&op).map(|k| ranks[k as usize]).max().unwrap_or(Rank::Constant),
         });
+    }
+    ranks
+}
+
+/// The same in a branch, which takes in nothing from others: everything but angles, sines and cosines is computed in
+/// the pass that needs it first.
+fn ranks_in_branch(graph: &Graph, link: &Link<'_, '_>) -> Vec<Rank> {
+    let mut ranks = ranks(graph, link);
+    let mut angles = BTreeSet::new();
+    for id in (0..graph.len() as u32).rev() {
+        let op = graph.get(id).0;
+        if matches!(op, Op::Sin(_) | Op::Cos(_)) || angles.contains(&id) {
+            angles.insert(id);
+            angles.extend(nodes(&op));
+        }
+    }
+    for id in 0..graph.len() as u32 {
+        // What completes the results comes after all passes.
+        let last = link.passes.len() - 1;
+        let at = link.passes.iter().position(|pass| (id as usize) < pass.end).unwrap_or(last);
+        let rank = ranks[id as usize];
+        let given = matches!(graph.get(id).0, Op::Input(_)) || (rank == Rank::State && angles.contains(&id));
+        if rank != Rank::Constant && !given {
+            ranks[id as usize] = Rank::Pass(at);
+        }
     }
     ranks
 }
@@ -233,32 +280,6 @@ fn columns(
     (columns, table)
 }
 
-fn value(op: Op, link: &Link<'_, '_>, row: &[f64], values: &BTreeMap<u32, f64>) -> f64 {
-    let of = |o: Operand| match o {
-        Operand::Const(bits) => f64::from_bits(bits),
-        Operand::Node(id) => values[&id],
-    };
-    let node = |id: u32| values[&id];
-    let signed = |x: f64, minus: bool| if minus { -x } else { x };
-    match op {
-        Op::Input(k) => match link.inputs[k as usize] {
-            LinkInput::Column(c) => row[c],
-            _ => unreachable!("depends on more than constants"),
-        },
-        Op::Add(a, b) => of(a) + of(b),
-        Op::Sub(a, b) => of(a) - of(b),
-        Op::Mul(a, b) => of(a) * of(b),
-        Op::Div(a, b) => of(a) / of(b),
-        Op::Fma(_) => unreachable!("the sweeps make none"),
-        Op::ReciprocalAbove(p) => {
-            Scalar::reciprocal_above(signed(of(p.value), p.minus_value), signed(of(p.floor), p.minus_floor))
-        }
-        Op::Sqrt(a) => Scalar::sqrt(node(a)),
-        Op::Sin(a) => Scalar::sin_cos(node(a)).0,
-        Op::Cos(a) => Scalar::sin_cos(node(a)).1,
-    }
-}
-
 /// Which pass computes what.
 struct Cut<'a> {
     graph: &'a Graph,
@@ -266,6 +287,8 @@ struct Cut<'a> {
     live: &'a [bool],
     passes: usize,
     outputs: &'a [Vec<(ProgramResult, Target)>],
+    /// Nodes that others than the passes read.
+    handed: BTreeSet<u32>,
     /// Nodes computed in the pass that uses them although an earlier one could.
     sunk: BTreeSet<u32>,
 }
@@ -317,6 +340,7 @@ impl Cut<'_> {
     /// Nodes one pass takes from another, sines and cosines included.
     fn crossing(&self) -> BTreeSet<u32> {
         let mut crossing = self.turn_functions();
+        crossing.extend(&self.handed);
         for pass in 0..self.passes {
             let own = self.own(pass);
             let needed = own.iter().flat_map(|&id| nodes(&self.graph.get(id).0));
@@ -347,7 +371,10 @@ impl Cut<'_> {
             let sinks = crossing.iter().copied().find(|&id| {
                 let Rank::Pass(home) = self.ranks[id as usize] else { return false };
                 let op = self.graph.get(id).0;
-                !matches!(op, Op::Input(_)) && !used[home].contains(&id) && nodes(&op).all(at_hand)
+                !matches!(op, Op::Input(_))
+                    && !self.handed.contains(&id)
+                    && !used[home].contains(&id)
+                    && nodes(&op).all(at_hand)
             });
             match sinks {
                 Some(id) => self.sunk.insert(id),

@@ -22,11 +22,30 @@ pub struct Run {
     pub(super) template: Vec<Node<Slot>>,
     /// One row for each turn of the loop, columns as the template numbers them.
     pub table: Vec<Vec<f64>>,
+    /// Set where the turns are branches of one node instead of links of a chain.
+    pub branches: Option<Branches>,
+}
+
+/// Turns that are like branches of one node. [`Run::nodes`] and [`Run::period`] are those of the first of them.
+#[derive(Clone, Debug)]
+pub struct Branches {
+    /// The node that all of them hang on.
+    pub parent: usize,
+    /// First node of each, in ascending order.
+    pub roots: Vec<usize>,
+    /// By how much the first coordinate and the first velocity move on from branch to branch.
+    pub stride: (usize, usize),
+    /// Coordinates and velocities of one branch.
+    pub size: (usize, usize),
+    /// Unknowns of a branch, by its own velocities.
+    pub(super) unknowns: Vec<Unknown>,
+    /// Whether the momentum of the branches is accumulated at their parent.
+    pub(super) accumulates: bool,
 }
 
 /// A constant of a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Slot {
+pub enum Slot {
     /// The same in all links.
     Const(f64),
     /// Column of the table.
@@ -175,13 +194,13 @@ fn class(x: f64) -> Option<i8> {
     [0, 1, -1].into_iter().find(|&c| f64::from(c) == x)
 }
 
-fn constants(node: &Node<f64>) -> Vec<f64> {
+pub(super) fn constants(node: &Node<f64>) -> Vec<f64> {
     let mut out = Vec::new();
     map_node(node, &mut |x| out.push(x));
     out
 }
 
-fn same_step(a: &ElementaryTransform<f64>, b: &ElementaryTransform<f64>) -> bool {
+pub(super) fn same_step(a: &ElementaryTransform<f64>, b: &ElementaryTransform<f64>) -> bool {
     match (a, b) {
         (ElementaryTransform::Turn { axis: a, .. }, ElementaryTransform::Turn { axis: b, .. }) => a == b,
         (ElementaryTransform::Shift { axis: a, .. }, ElementaryTransform::Shift { axis: b, .. }) => a == b,
@@ -190,7 +209,7 @@ fn same_step(a: &ElementaryTransform<f64>, b: &ElementaryTransform<f64>) -> bool
     }
 }
 
-fn same_joint(a: &Node<f64>, b: &Node<f64>) -> bool {
+pub(super) fn same_joint(a: &Node<f64>, b: &Node<f64>) -> bool {
     std::mem::discriminant(&a.kind) == std::mem::discriminant(&b.kind)
         && a.quarter == b.quarter
         && a.elimination == b.elimination
@@ -254,21 +273,27 @@ fn tabulate(links: &[Node<f64>], nodes: Range<usize>, period: usize) -> Option<R
         let like = group()
             .map(|link| Some(Node { place: padded(&link.place, &steps)?, ..link.clone() }))
             .collect::<Option<Vec<_>>>()?;
-        let rows: Vec<Vec<f64>> = like.iter().map(constants).collect();
-        let mut slots = (0..rows.first()?.len()).map(|c| {
-            let same = rows.iter().all(|row| row[c].to_bits() == rows[0][c].to_bits());
-            if same {
-                return Slot::Const(rows[0][c]);
-            }
-            let column = table[0].len();
-            for (row, from) in table.iter_mut().zip(&rows) {
-                row.push(from[c]);
-            }
-            Slot::Column(column)
-        });
-        template.push(map_node(&like[0], &mut |_| slots.next().unwrap_or(Slot::Const(0.0))));
+        template.push(columns_of(&like, &mut table));
     }
-    Some(Run { nodes, period, template, table })
+    Some(Run { nodes, period, template, table, branches: None })
+}
+
+/// One node of the template from its likes in all turns, each of which has the same steps: constants that differ get
+/// a column of the table.
+pub(super) fn columns_of(like: &[Node<f64>], table: &mut [Vec<f64>]) -> Node<Slot> {
+    let rows: Vec<Vec<f64>> = like.iter().map(constants).collect();
+    let mut slots = (0..rows[0].len()).map(|c| {
+        let same = rows.iter().all(|row| row[c].to_bits() == rows[0][c].to_bits());
+        if same {
+            return Slot::Const(rows[0][c]);
+        }
+        let column = table[0].len();
+        for (row, from) in table.iter_mut().zip(&rows) {
+            row.push(from[c]);
+        }
+        Slot::Column(column)
+    });
+    map_node(&like[0], &mut |_| slots.next().unwrap_or(Slot::Const(0.0)))
 }
 
 /// A node with every constant replaced, always in the same order.

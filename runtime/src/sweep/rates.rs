@@ -1,6 +1,6 @@
 //! Momentum rates `ṗ` (4.36).
 
-use super::pass::{each_node, Sweep};
+use super::pass::{each_node, visit_force, Sweep};
 use super::{Quantity, Sweeps, Trace};
 use crate::spatial::{ArticulatedInertia, Force, Motion};
 use crate::tree::{Freedom, Kind, Node, Source};
@@ -12,6 +12,11 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
     pub(super) const ACCUMULATED_MOMENTA: Self = Sweep {
         needed: |tree| tree.nodes.iter().any(|node| node.elimination.accumulates_momentum),
         begin: |cx| cx.sweeps.accumulate_begin(cx.w),
+        carried: |cx, i, visit| {
+            if cx.sweeps.tree.nodes[i].elimination.accumulates_momentum {
+                visit_force(&mut cx.w.force[i], visit);
+            }
+        },
         ..each_node!(TipToBase, |cx, i| cx.sweeps.accumulate_node(i, cx.given.second, cx.w))
     };
 

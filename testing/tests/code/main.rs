@@ -11,5 +11,6 @@ mod external;
 mod machine_code;
 mod rewriting;
 mod rolled;
+mod together;
 mod wasm;
 mod wide;

@@ -57,6 +57,14 @@ pub fn run(program: Program, rewrite: Rewrite) -> Program {
         Some(plain) => finished(fewest(collected, plain), rewrite),
         None => finished(collected, rewrite),
     };
+    order(program, rewrite)
+}
+
+/// The program in the order in which it is to be emitted; its operations stay.
+pub fn order(program: Program, rewrite: Rewrite) -> Program {
+    if rewrite == Rewrite::None {
+        return program;
+    }
     let wide = program.throughput() >= WIDE * f64::from(program.critical_path());
     match wide && program.instructions() >= LONG {
         true => program,

@@ -91,6 +91,13 @@ impl<'a> Lowering<'a> {
                 rest = after;
                 continue;
             }
+            // if LANES == 1 && ..::kernel::VECTORS { return Self::rates_together::<A>(..); }
+            // What computes like branches together is compared with the interpreter before it is text, and compiled.
+            if let [Word("if"), Word("LANES"), ..] = rest {
+                let end = rest.iter().position(|tree| matches!(tree, Curly(_))).expect("a block after a condition");
+                rest = &rest[end + 1..];
+                continue;
+            }
             let Some(end) = rest.iter().position(|tree| matches!(tree, Word(";"))) else { return rest };
             self.statement(&rest[..end]);
             rest = &rest[end + 1..];
