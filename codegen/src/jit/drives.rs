@@ -30,7 +30,8 @@ impl SampledDrives {
     /// Samples every `step` s from time zero on, `joints` numbers each; outside of them the first and the last polynomial
     /// go on. `None` unless there are as many rates as positions, two samples at least, and a step greater than zero.
     pub fn new(step: f64, joints: usize, q: &[f64], v: &[f64]) -> Option<Self> {
-        let sound = joints > 0 && q.len() == v.len() && q.len().is_multiple_of(joints) && q.len() >= 2 * joints && step > 0.0;
+        let sound =
+            joints > 0 && q.len() == v.len() && q.len().is_multiple_of(joints) && q.len() >= 2 * joints && step > 0.0;
         sound.then(|| SampledDrives { step, joints, q: q.to_vec(), v: v.to_vec() })
     }
 }
