@@ -4,6 +4,10 @@
 # Node only. `.ci/page.sh` makes the files.
 set -euo pipefail
 cd "$(dirname "$0")/.."
+if ! command -v node > /dev/null; then
+    apt-get update -q
+    DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends nodejs
+fi
 few=(models/ur5.urdf models/mechanisms/fourbar.toml models/contacts/bouncing_ball.toml)
 if [ "${1:-}" = --quick ]; then
     node page/tests/states.mjs "${few[@]}"

@@ -298,7 +298,7 @@ void double_pendulum_rates(
     const double lower_minus_u_x = 0.5 * lower_sin;
     const double lower_t0 = lower_u_y + 0.33340000000000003;
     /* upper: U, Mj, k and the reduced inertia M' (4.44) */
-    const double upper_t1 = lower_u_y + 1.3334000000000001;
+    const double upper_t1 = lower_u_y + 1.6668000000000003;
     /* lower: gravity and wrenches */
     const double lower_t1 = lower_cos * upper_minus_g_y;
     /* lower: inertia carried to the parent, M* (4.48) */
@@ -310,30 +310,30 @@ void double_pendulum_rates(
     /* upper: bias momentum D, D' (4.45, 4.49) */
     const double upper_t3 = -lower_t0 * upper_t0 + p_0;
     /* upper: U, Mj, k and the reduced inertia M' (4.44) */
-    const double upper_t4 = lower_t0 + upper_t1;
+    const double upper_t4 = lower_u_y + upper_t1;
     /* lower: gravity and wrenches */
     const double lower_minus_g_y = lower_sin * upper_g_x + lower_t1;
     /* lower: momentum rate (4.36) */
     const double pd_0 = -upper_minus_m_ry_z * upper_minus_g_y + lower_t2;
     pd[0] = pd_0;
     /* upper: U, Mj, k and the reduced inertia M' (4.44) */
-    const double upper_minus_u_rz = lower_t0 * upper_t2 - upper_t4;
+    const double upper_u_rz = -lower_t0 * upper_t2 + upper_t4;
     /* lower: momentum rate (4.36) */
     const double lower_t3 = -0.5 * lower_minus_g_y + tau_1;
     /* upper: U, Mj, k and the reduced inertia M' (4.44) */
-    const double upper_minus_rho = 1.0 / upper_minus_u_rz;
+    const double upper_rho = 1.0 / upper_u_rz;
     /* upper: bias momentum D, D' (4.45, 4.49) */
-    const double upper_minus_e = upper_minus_rho * upper_t3;
-    qd[0] = -upper_minus_e;
+    const double upper_e = upper_rho * upper_t3;
+    qd[0] = upper_e;
     /* upper: velocity and joint rate (4.40) */
-    const double lower_v = upper_t2 * upper_minus_e + upper_t0;
+    const double lower_v = -upper_t2 * upper_e + upper_t0;
     qd[1] = lower_v;
     /* lower: momentum rate (4.36) */
-    const double lower_t4 = lower_minus_u_x * upper_minus_e;
+    const double lower_t4 = lower_minus_u_x * upper_e;
     /* lower: velocity and joint rate (4.40) */
-    const double lower_minus_omega_rz = upper_minus_e - lower_v;
+    const double lower_omega_rz = upper_e + lower_v;
     /* lower: momentum rate (4.36) */
-    const double pd_1 = -lower_minus_omega_rz * lower_t4 + lower_t3;
+    const double pd_1 = -lower_omega_rz * lower_t4 + lower_t3;
     pd[1] = pd_1;
 }
 
@@ -391,13 +391,13 @@ void double_pendulum_energy(
     /* upper: bias momentum D, D' (4.45, 4.49) */
     const double upper_t0 = 2.9994001199760048 * p_1;
     /* upper: inertia carried to the parent, M* (4.48) */
-    const double upper_t1 = 0.5 * lower_sin;
+    const double upper_t1 = 0.5 * upper_sin;
     /* lower: inertia carried to the parent, M* (4.48) */
     const double lower_t0 = lower_u_y + 0.33340000000000003;
     /* upper: U, Mj, k and the reduced inertia M' (4.44) */
-    const double upper_t2 = lower_u_y + 1.3334000000000001;
+    const double upper_t2 = lower_u_y + 1.6668000000000003;
     /* upper: inertia carried to the parent, M* (4.48) */
-    const double upper_t3 = upper_sin * upper_t1;
+    const double upper_t3 = lower_sin * upper_t1;
     /* lower: inertia carried to the parent, M* (4.48) */
     const double upper_minus_m_ry_z = lower_u_y + 1.5;
     /* upper: U, Mj, k and the reduced inertia M' (4.44) */
@@ -405,25 +405,25 @@ void double_pendulum_energy(
     /* upper: bias momentum D, D' (4.45, 4.49) */
     const double upper_t5 = -lower_t0 * upper_t0 + p_0;
     /* upper: U, Mj, k and the reduced inertia M' (4.44) */
-    const double upper_t6 = lower_t0 + upper_t2;
+    const double upper_t6 = lower_u_y + upper_t2;
     /* upper: inertia carried to the parent, M* (4.48) */
-    const double upper_mp_rx_z = upper_cos * upper_minus_m_ry_z - upper_t3;
+    const double upper_minus_mp_rx_z = -upper_cos * upper_minus_m_ry_z + upper_t3;
     /* upper: U, Mj, k and the reduced inertia M' (4.44) */
-    const double upper_minus_u_rz = lower_t0 * upper_t4 - upper_t6;
+    const double upper_u_rz = -lower_t0 * upper_t4 + upper_t6;
     /* ground: energy */
-    const double minus_energy_1 = 9.81 * upper_mp_rx_z;
-    energy[1] = -minus_energy_1;
+    const double energy_1 = 9.81 * upper_minus_mp_rx_z;
+    energy[1] = energy_1;
     /* upper: U, Mj, k and the reduced inertia M' (4.44) */
-    const double upper_minus_rho = 1.0 / upper_minus_u_rz;
+    const double upper_rho = 1.0 / upper_u_rz;
     /* upper: bias momentum D, D' (4.45, 4.49) */
-    const double upper_minus_e = upper_minus_rho * upper_t5;
+    const double upper_e = upper_rho * upper_t5;
     /* upper: velocity and joint rate (4.40) */
-    const double lower_v = upper_t4 * upper_minus_e + upper_t0;
+    const double lower_v = -upper_t4 * upper_e + upper_t0;
     /* lower: energy */
-    const double lower_t1 = p_0 * upper_minus_e;
-    const double lower_t2 = -p_1 * lower_v + lower_t1;
-    const double minus_energy_0 = 0.5 * lower_t2;
-    energy[0] = -minus_energy_0;
+    const double lower_t1 = p_0 * upper_e;
+    const double lower_t2 = p_1 * lower_v + lower_t1;
+    const double energy_0 = 0.5 * lower_t2;
+    energy[0] = energy_0;
 }
 
 void double_pendulum_coordinate_rates(

@@ -154,10 +154,10 @@ fn compare(what: &str, model: &Model, plan: &Plan, options: &Options) -> usize {
     branches
 }
 
-#[test]
-fn random_trees() {
+/// Compares on one tree for each seed. Returns the number of branches.
+fn compare_trees(seeds: std::ops::Range<u64>) -> usize {
     let mut branches = 0;
-    for seed in 0..60 {
+    for seed in seeds {
         let numbers = NUMBERS[seed as usize % 4];
         let model = tree(seed, numbers);
         let elimination = match seed % 5 {
@@ -171,7 +171,20 @@ fn random_trees() {
             branches += compare(&what, &model, &plan, &options(arithmetic, elimination));
         }
     }
+    branches
+}
+
+#[test]
+fn random_trees() {
     // The odd branch between them leaves some sets without equal distances.
+    let branches = compare_trees(0..15);
+    assert!(branches > 50, "only {branches} branches are computed together");
+}
+
+#[test]
+#[ignore = "takes a minute: cargo test -p mbd-testing --test code together -- --ignored"]
+fn more_random_trees() {
+    let branches = compare_trees(15..75);
     assert!(branches > 200, "only {branches} branches are computed together");
 }
 
