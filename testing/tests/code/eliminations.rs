@@ -139,8 +139,12 @@ fn default_eliminations_do_not_cost_accuracy() {
         }
         let plans = [EliminationStrategy::Single, EliminationStrategy::Fastest]
             .map(|elimination| chosen(&model, elimination).plan);
-        let errors = measure(&plans, &[ARTICULATED, DEFAULT], 300);
-        all.extend(beyond(&name, &ratios(&errors[1], &errors[0])));
+        let found = |states| {
+            let errors = measure(&plans, &[ARTICULATED, DEFAULT], states);
+            beyond(&name, &ratios(&errors[1], &errors[0]))
+        };
+        // The worst hundredth of 300 states are three; who is beyond the limits with them is judged by thirty.
+        all.extend(found(300).and_then(|_| found(3000)));
     }
     assert!(all.is_empty(), "{}", all.join("\n"));
 }
