@@ -32,6 +32,8 @@ async function start() {
   renewed();
   requestAnimationFrame(tick);
   if (name) {
+    $("empty").hidden = true;
+    $("facts").textContent = `reading ${name}`;
     const list = files.map(([file, contents]) => [file, unpacked(contents).buffer]);
     list.sort(([a], [b]) => (b === name) - (a === name));
     await open(list, options);
