@@ -37,9 +37,8 @@ pub fn has_rows(plan: &Plan, i: usize) -> bool {
 }
 
 /// Unbranched paths of single-freedom joints, inner joint first, that are eliminated as chains. No row of a constraint
-/// passes through them. They are as long as
-/// possible, and each joint has a coordinate of its own. Those at the tips come first, in the order of the nodes;
-/// every other chain comes after those beyond it.
+/// passes through them. They are as long as possible, and each joint has a coordinate of its own. Those at the tips come
+/// first, in the order of the nodes; every other chain comes after those beyond it.
 pub fn chains(plan: &Plan) -> Vec<Vec<usize>> {
     let children = children(plan);
     // A coordinate that several joints share, or a drive, would be missed where screws meet columns.
