@@ -38,11 +38,9 @@ where
 
     fn slot(&self, j: usize) -> usize {
         let slot = self.head + j;
-        if slot < N {
-            slot
-        } else {
-            slot - N
-        }
+        let slot = if slot < N { slot } else { slot - N };
+        // The compiler sees that no index is out of bounds.
+        slot.min(N - 1)
     }
 
     /// Rate `j`, 0 the newest.
