@@ -22,8 +22,13 @@ flags+=" -Zunstable-options -Cpanic=immediate-abort -Zlocation-detail=none --rem
 RUSTC=/usr/bin/rustc RUSTC_BOOTSTRAP=1 RUSTFLAGS=$flags CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=wasm-ld cargo build --release \
     --manifest-path "$manifest" --target-dir "$target/wasm" --lib -Zbuild-std=std,panic_abort \
     --target wasm32-unknown-unknown
-wasm-opt -Oz --enable-bulk-memory --enable-sign-ext --enable-nontrapping-float-to-int --strip-debug --strip-producers \
-    "$target/wasm/wasm32-unknown-unknown/release/page.wasm" -o "$target/page.wasm"
+wasm=$target/wasm/wasm32-unknown-unknown/release/page.wasm
+# What the second run finds depends on the first.
+for passes in "-Oz --converge" "--local-cse -Oz"; do
+    wasm-opt $passes --enable-bulk-memory --enable-sign-ext --enable-nontrapping-float-to-int --strip-debug --strip-producers \
+        "$wasm" -o "$target/page.wasm"
+    wasm=$target/page.wasm
+done
 squeeze "$target/page.wasm" > cli/src/view/page.wasm.lzma
 ls -l "$target/page.wasm" cli/src/view/page.*.lzma
 cargo build --release --manifest-path "$manifest" --target-dir "$target" --bin states

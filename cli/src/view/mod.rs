@@ -26,6 +26,12 @@ const UNPACK: &str = include_str!("unpack.js");
 const TEMPLATE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("page.css");
 
+/// A text without indents, empty lines and lines of comments.
+fn compact(text: &str) -> String {
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//"));
+    lines.collect::<Vec<_>>().join("\n")
+}
+
 /// Writes the page of a model, or an empty one on which files can be dropped.
 pub fn run(args: &ViewArgs, out: &mut dyn Write) -> Outcome {
     if let (Some(file), Some(model)) = (&args.gltf, &args.model) {
@@ -125,11 +131,11 @@ fn page(given: &Given) -> String {
         TEMPLATE,
         &[
             ("TITLE", &title),
-            ("STYLE", STYLE),
+            ("STYLE", &compact(STYLE)),
             ("GIVEN", &json),
             ("WASM", &wasm),
             ("SCRIPTS", &scripts),
-            ("UNPACK", UNPACK),
+            ("UNPACK", &compact(UNPACK)),
             ("INKS", &inks),
         ],
     )
