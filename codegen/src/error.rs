@@ -34,6 +34,11 @@ pub enum GenerateError {
         /// Name of the model.
         model: String,
     },
+    /// The output is a derivative, and the generator was built without them.
+    BuiltWithoutDerivatives {
+        /// The output.
+        output: Output,
+    },
     /// Code for modes of contacts is asked for, and the model has no contacts.
     ModesNeedContacts {
         /// Name of the model.
@@ -86,6 +91,10 @@ impl fmt::Display for GenerateError {
             GenerateError::OutputNeedsContacts { output, model } => {
                 let name = output.name();
                 write!(f, "`{name}` is an output of mechanisms with contacts, of code for their modes (option `modes`), and this is not such code of `{model}`")
+            }
+            GenerateError::BuiltWithoutDerivatives { output } => {
+                let name = output.name();
+                write!(f, "`{name}` is not in this program: `mbd-codegen` was built without its feature `derivatives`")
             }
             GenerateError::ModesNeedContacts { model } => {
                 write!(f, "code for modes of contacts is asked for, and `{model}` has no contacts")

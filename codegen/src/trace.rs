@@ -1,20 +1,20 @@
 //! Tracing: runs the sweeps on symbols, from a plan to the straight-line program of each output.
 
-mod directional;
+#[cfg(feature = "derivatives")]
+mod derivatives;
 mod inputs;
 
 use mbd_runtime::spatial::Motion;
-use mbd_runtime::sweep::{Derivatives, FrameState, ParameterDerivatives, Sweeps};
+use mbd_runtime::sweep::{FrameState, Sweeps};
 use mbd_runtime::tree::Tree;
 use mbd_runtime::workspace::Workspace;
-use mbd_runtime::{Dual, MomentumDerivatives, Scalar};
+use mbd_runtime::Scalar;
 
 use crate::error::GenerateError;
 use crate::options::{Arithmetic, EliminationStrategy, Options, Precision};
 use crate::output::{Availability, Output, OutputProgram, Sizes, Spec, COORDINATE_RATES};
 use crate::plan::Plan;
 use crate::symbolic::{passes, Entry, Expr, Graph, Name, Program, Rewrite};
-use directional::Directional;
 pub use inputs::sizes;
 pub(crate) use inputs::SymbolicInputs;
 
@@ -36,6 +36,9 @@ pub fn chosen_frames(plan: &Plan, options: &Options) -> Result<Vec<usize>, Gener
 /// Rejects an output that the model does not have.
 fn check_availability(plan: &Plan, output: Output) -> Result<(), GenerateError> {
     let model = || plan.model.name.clone();
+    if cfg!(not(feature = "derivatives")) && output.differentiates() {
+        return Err(GenerateError::BuiltWithoutDerivatives { output });
+    }
     match output.spec().availability {
         // Where some rows act, or none, there are the outputs of plans with rows.
         _ if output.spec().available(plan.dims.rows > 0) => Ok(()),
@@ -107,6 +110,7 @@ fn name_results(graph: &Graph, spec: &Spec, sizes: &Sizes, results: &[Vec<Expr>]
 /// A run of the sweeps on symbols.
 struct Run<'a, 'g> {
     graph: &'g Graph,
+    #[cfg_attr(not(feature = "derivatives"), allow(dead_code, reason = "derivatives read it"))]
     plan: &'a Plan,
     /// The mechanism with the chosen elimination.
     tree: &'a Tree<Expr<'g>>,
@@ -126,9 +130,6 @@ impl<'g> Run<'_, 'g> {
         let other = Sweeps { tree: tree.for_accelerations(), trace };
         let w = &mut Workspace::new(tree);
         let v = &mut vec![Expr::zero(); tree.dims.nv];
-        // Derivatives where there are constraints.
-        let constrained = !self.plan.constraints.is_empty();
-        let directional = Directional { graph: trace, plan: self.plan, given, tolerance: tree.tolerance };
         match (output, results) {
             (Output::Rates, [qd, pd]) => sweeps.rates(q, second, u, w, v, qd, pd),
             (Output::Velocities, [v]) => sweeps.velocities(q, second, u, w, v),
@@ -164,24 +165,10 @@ impl<'g> Run<'_, 'g> {
             (Output::Centroidal, [center, matrix, bias]) => {
                 Sweeps { tree: self.physical, trace }.centroidal(q, second, u, w, center, matrix, bias);
             }
-            (Output::Derivatives, [v, pd, dv_dq, dv_dp, dpd_dq, dpd_dp]) if constrained => {
-                [*v, *pd, *dv_dq, *dv_dp, *dpd_dq, *dpd_dp] = directional.derivatives();
+            #[cfg(feature = "derivatives")]
+            (Output::Derivatives | Output::MomentumDerivatives | Output::ParameterDerivatives, results) => {
+                self.derivatives(output, results);
             }
-            (Output::Derivatives, [v, pd, dv_dq, dv_dp, dpd_dq, dpd_dp]) => {
-                let mut d = Derivatives::new(tree);
-                sweeps.derivatives(q, second, u, w, &mut d);
-                (*v, *pd, *dv_dq, *dv_dp, *dpd_dq, *dpd_dp) = (d.v, d.pd, d.dv_dq, d.dv_dp, d.dpd_dq, d.dpd_dp);
-            }
-            (Output::MomentumDerivatives, [p, pd, dp_dq, dp_dv, dpd_dq, dpd_dv]) => {
-                let (mut d, mut out) = (Derivatives::new(tree), MomentumDerivatives::new(tree));
-                sweeps.momentum_derivatives(q, second, u, w, &mut d, &mut out);
-                (*p, *pd, *dp_dq, *dp_dv) = (out.p, out.pd, out.dp_dq, out.dp_dv);
-                (*dpd_dq, *dpd_dv) = (out.dpd_dq, out.dpd_dv);
-            }
-            (Output::ParameterDerivatives, [dv, dpd]) if constrained => {
-                [*dv, *dpd] = directional.parameter_derivatives()
-            }
-            (Output::ParameterDerivatives, [dv, dpd]) => [*dv, *dpd] = self.parameter_derivatives(),
             (Output::ConstraintResiduals, [phi, entries]) => sweeps.constraint_residuals(q, u, w, phi, entries),
             (Output::ProjectMomenta, [v, freed, sigma]) => sweeps.project_momenta(q, second, u, w, v, freed, sigma),
             (Output::PositionCorrection, [phi, dq, pivots]) => sweeps.position_correction(q, u, w, phi, dq, pivots),
@@ -194,27 +181,6 @@ impl<'g> Run<'_, 'g> {
     /// The chosen frames.
     fn frames(&self) -> impl Iterator<Item = &mbd_runtime::tree::TreeFrame<Expr<'g>>> + Clone {
         self.frames.iter().map(|&k| &self.tree.frames[k])
-    }
-
-    /// `∂v/∂params` and `∂ṗ/∂params`, row by row: one dual sweep for each parameter.
-    fn parameter_derivatives(&self) -> [Vec<Expr<'g>>; 2] {
-        let (tree, trace, given, inputs) = (self.tree, self.graph, self.given, self.given.inputs());
-        let (q, params) = (&given.q, &given.params);
-        let mut d = Derivatives::new(tree);
-        Sweeps { tree, trace }.derivatives(q, &given.second, &inputs, &mut Workspace::new(tree), &mut d);
-        let columns: Vec<[Vec<Expr>; 2]> = (0..params.len())
-            .map(|k| {
-                let one = |j: usize| if j == k { Expr::one() } else { Expr::zero() };
-                let varied: Vec<Dual<Expr>> = params.iter().enumerate().map(|(j, x)| Dual::new(*x, one(j))).collect();
-                let gravity = self.plan.gravity_or(&varied, || inputs.gravity.map(|x| Dual::new(x, Expr::zero())));
-                let tree = self.plan.tree(&varied).regrouped();
-                let mut column = ParameterDerivatives::new(&tree);
-                column.compute(&Sweeps { tree: &tree, trace }, gravity, q, &inputs, &d);
-                [column.dv, column.dpd]
-            })
-            .collect();
-        let rows = |half: usize| (0..tree.dims.nv).flat_map(|a| columns.iter().map(move |c| c[half][a])).collect();
-        [rows(0), rows(1)]
     }
 }
 

@@ -134,7 +134,7 @@ pub extern "C" fn advance(steps: usize) -> usize {
     done
 }
 
-/// Looks at this instant; returns the address of its numbers. The layout is in `page/src/scene.rs`.
+/// Looks at this instant; returns the address of its numbers. The layout is in `page/src/scene/look.rs`.
 #[no_mangle]
 pub extern "C" fn look(forces: u32) -> *const f64 {
     on(|scene| scene.look(forces != 0));

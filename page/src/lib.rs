@@ -3,6 +3,11 @@
 //! One instance holds one [`Scene`](scene::Scene). A program for the same scene without a browser is `main.rs`, whose
 //! states the page's are compared with.
 
+/// Sources that the command shares with the page name this crate's parts as those of `multibody`.
+extern crate self as multibody;
+pub use mbd_codegen as codegen;
+pub use mbd_runtime as runtime;
+
 mod abi;
 mod describe;
 mod evaluator;

@@ -2,9 +2,9 @@
 //! many steps of 1 ms from its start; and a hash of its generated code. A number that is none has many bits, and counts
 //! as one.
 
-use page::scene::{hash, read, Files, Reading, Scene};
+use page::scene::{read, Files, Reading, Scene};
 
-use multibody::codegen::{generate, Options};
+use page::codegen::{generate, Options};
 
 fn line(path: &str, steps: usize) -> Result<String, String> {
     let text = std::fs::read_to_string(path).map_err(|e| e.to_string())?;
@@ -33,4 +33,9 @@ fn main() {
         let line = line(&path, steps).unwrap_or_else(|message| message.lines().next().unwrap_or_default().to_string());
         println!("{path} {line}");
     }
+}
+
+/// Fowler, Noll and Vo's hash of some bytes.
+fn hash(bytes: impl Iterator<Item = u8>) -> u64 {
+    bytes.fold(0xcbf2_9ce4_8422_2325, |h, byte| (h ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }

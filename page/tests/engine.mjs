@@ -13,7 +13,7 @@ export const scriptsAreFresh = new TextDecoder().decode(unlzma(read("page.js.lzm
 /** A fresh instance. */
 export const engine = () => make(module);
 
-/** Fowler, Noll and Vo's hash, as `page/src/scene.rs` has it. */
+/** Fowler, Noll and Vo's hash, as `page/src/main.rs` has it. */
 export function hash(bytes) {
   let [low, high] = [0x84222325, 0xcbf29ce4];
   for (const byte of bytes) {

@@ -11,16 +11,18 @@ use super::ImportArgs;
 #[derive(Args)]
 #[command(
     after_help = "The page is one file without requests: it works without a network and without this program. It has the readers and the
-generator in it, so that any other model can be dropped on it. Without MODEL it is empty, for models to be dropped on.
+generator in it, so that any other model can be dropped on it. Without MODEL and FILE, an empty page for models to be dropped on
+is served to browsers of this machine, until Ctrl-C.
 
 Examples:
   mbd view models/double_pendulum.toml                writes double_pendulum.html
   mbd view robot.urdf --base floating --floor 0       a robot that falls on a floor
-  mbd view                                            an empty page, mbd-view.html
+  mbd view                                            serves an empty page at a free port of 127.0.0.1
+  mbd view -o drop.html                               writes the empty page
   mbd view models/ur5.urdf --gltf ur5.glb --time 5    the motion of five seconds for other viewers"
 )]
 pub struct ViewArgs {
-    /// Description of the mechanism, `.toml`, `.urdf` or `.xml`; without it the page is empty
+    /// Description of the mechanism, `.toml`, `.urdf` or `.xml`; without it the page is empty, and is served
     pub model: Option<PathBuf>,
     #[command(flatten)]
     pub import: ImportArgs,
@@ -30,6 +32,9 @@ pub struct ViewArgs {
     /// File to write; `-` for standard output [default: that of the model, with .html]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
+    /// Port of 127.0.0.1 at which the empty page is served; 0 is a free one
+    #[arg(long, value_name = "PORT", default_value_t = 0, conflicts_with_all = ["model", "output"])]
+    pub port: u16,
     /// Write the motion as glTF 2.0 for other viewers instead: `.gltf`, or `.glb` in binary form
     #[arg(long, value_name = "FILE", requires = "model", conflicts_with = "output")]
     pub gltf: Option<PathBuf>,

@@ -4,6 +4,7 @@
 //! JavaScript files of this folder, as `page.js.lzma`. `.ci/page.sh` builds both.
 
 mod gltf;
+mod serve;
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -32,13 +33,14 @@ fn compact(text: &str) -> String {
     lines.collect::<Vec<_>>().join("\n")
 }
 
-/// Writes the page of a model, or an empty one on which files can be dropped.
+/// Writes the page of a model, or serves an empty one on which files can be dropped.
 pub fn run(args: &ViewArgs, out: &mut dyn Write) -> Outcome {
     if let (Some(file), Some(model)) = (&args.gltf, &args.model) {
         return gltf::run(args, model, file, out);
     }
     let given = match &args.model {
         Some(model) => Given::read(args, model)?,
+        None if args.output.is_none() => return serve::run(&page(&Given::default()), args.port, out),
         None => Given::default(),
     };
     let file = args.output.clone().unwrap_or_else(|| PathBuf::from(given.file_name()));

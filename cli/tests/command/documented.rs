@@ -13,6 +13,9 @@ use crate::run::{err, folder, out, run_in, HAS_SCENES, IS_LAB, ROOT};
 /// Arguments of commands that take too long for a test.
 const LONG: [&str; 1] = ["models/chain100.toml"];
 
+/// Arguments of the command that ends when it is interrupted.
+const ENDLESS: [&str; 1] = ["view"];
+
 /// The folder into which the commands of a page write its pictures.
 const PICTURES: &str = "book/src/pictures";
 
@@ -79,7 +82,7 @@ impl Shown {
         let is_file = |a: &str| [".toml", ".urdf", ".xml", ".json"].iter().any(|end| a.ends_with(end));
         let there = (0..arguments.len()).filter(|k| is_file(arguments[*k]) && !is_output(*k));
         let there = there.into_iter().all(|k| folder.join(arguments[k]).exists());
-        there && !IS_LAB && !arguments.is_empty() && !LONG.iter().any(|long| self.text.contains(long))
+        there && !IS_LAB && !arguments.is_empty() && *arguments != ENDLESS && !LONG.iter().any(|long| self.text.contains(long))
     }
 }
 

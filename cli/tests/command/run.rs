@@ -10,7 +10,7 @@ use serde_json::Value;
 pub const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
 /// The executable under test: that of the crate to which the test belongs.
-const PROGRAM: &str = match (option_env!("CARGO_BIN_EXE_mbd"), option_env!("CARGO_BIN_EXE_mbd-lab")) {
+pub const PROGRAM: &str = match (option_env!("CARGO_BIN_EXE_mbd"), option_env!("CARGO_BIN_EXE_mbd-lab")) {
     (Some(program), _) | (None, Some(program)) => program,
     (None, None) => panic!("the tests of a command must be in its crate"),
 };

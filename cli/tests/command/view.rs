@@ -1,5 +1,9 @@
 //! `mbd view`: the page that is written.
 
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+
 use crate::run::*;
 
 /// Largest size of the page with a model of this project, bytes.
@@ -37,7 +41,7 @@ fn one_small_file_without_requests() {
 #[test]
 fn an_empty_page_takes_what_is_dropped() {
     let folder = folder("view_empty");
-    good(run_in(&folder, &["view"]));
+    good(run_in(&folder, &["view", "-o", "mbd-view.html"]));
     let page = std::fs::read_to_string(folder.join("mbd-view.html")).expect("a page");
     let given: serde_json::Value = serde_json::from_str(script(&page, "given")).expect("JSON");
     assert!(given["name"].is_null() && given["files"].as_array().is_some_and(Vec::is_empty));
@@ -45,6 +49,54 @@ fn an_empty_page_takes_what_is_dropped() {
     let printed = good(run_in(&folder, &["view", "-o", "-"]));
     assert_eq!(out(&printed), page);
     assert_eq!(files(&folder), ["mbd-view.html"]);
+}
+
+/// A command that runs until it is dropped, with the first line that it writes.
+struct Running(Child, String);
+
+impl Running {
+    fn new(arguments: &[&str]) -> Running {
+        let mut command = Command::new(PROGRAM);
+        let mut child = command.args(arguments).stdout(Stdio::piped()).spawn().expect("the program");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("its output")).read_line(&mut line).expect("a line");
+        Running(child, line)
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// What a server answers to some bytes.
+fn asked(address: &str, request: &str) -> String {
+    let mut stream = TcpStream::connect(address).expect("a connection");
+    stream.write_all(request.as_bytes()).expect("a request");
+    let mut text = String::new();
+    stream.read_to_string(&mut text).expect("an answer");
+    text
+}
+
+#[test]
+fn without_a_model_an_empty_page_is_served() {
+    let server = Running::new(&["view"]);
+    let address = server.1.strip_prefix("http://").and_then(|line| line.split_once('/')).expect("an address").0;
+    assert!(address.starts_with("127.0.0.1:"), "{}", server.1);
+    // One that goes away and one that says nothing sensible do not end it.
+    drop(TcpStream::connect(address).expect("a connection"));
+    assert!(asked(address, "nonsense\r\n\r\n").starts_with("HTTP/1.1 405 "));
+    let page = asked(address, "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    let (head, body) = page.split_once("\r\n\r\n").expect("a head");
+    assert!(head.starts_with("HTTP/1.1 200 OK\r\n") && head.contains(&format!("Content-Length: {}\r\n", body.len())));
+    assert_eq!(body, out(&good(run_in(&folder("view_served"), &["view", "-o", "-"]))));
+    assert!(asked(address, "GET /../Cargo.toml HTTP/1.1\r\n\r\n").starts_with("HTTP/1.1 404 "));
+    let head = asked(address, "HEAD /?q HTTP/1.1\r\n\r\n");
+    assert!(head.starts_with("HTTP/1.1 200 OK\r\n") && head.ends_with("\r\n\r\n"));
+    let port = address.split_once(':').expect("a port").1;
+    bad(run_in(&folder("view_port"), &["view", "--port", port]), &[&format!("cannot serve at port {port}")]);
 }
 
 #[test]

@@ -186,6 +186,11 @@ impl Output {
         self.spec().name
     }
 
+    /// Whether it consists of derivatives of the rates or of the momenta.
+    pub(crate) const fn differentiates(self) -> bool {
+        matches!(self, Output::Derivatives | Output::MomentumDerivatives | Output::ParameterDerivatives)
+    }
+
     /// The output of a name.
     pub fn from_name(name: &str) -> Option<Output> {
         Output::ALL.iter().copied().find(|output| output.name() == name)

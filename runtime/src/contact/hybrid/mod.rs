@@ -263,6 +263,8 @@ pub struct Hybrid<Y: Touching, M> {
     /// Watched functions at the ends of a stretch of a step.
     left: Y::PerContact<Watched<Y::Scalar>>,
     right: Y::PerContact<Watched<Y::Scalar>>,
+    /// Those at the end of the step.
+    end: Y::PerContact<Watched<Y::Scalar>>,
     /// Angular velocities at these ends, rad/s: the sum of those of all joints.
     turning: [Y::Scalar; 2],
     departures: Y::PerContact<Departure<Y::Scalar>>,
@@ -275,8 +277,9 @@ pub struct Hybrid<Y: Touching, M> {
     settling: Y::Scalar,
     /// Largest acceleration with which a contact begins to slide, m/s²; zero where none does.
     slipping: Y::Scalar,
-    /// Whether nothing can move.
+    /// Whether nothing can move, and whether nothing moved at the end of the last step.
     immobile: bool,
+    rests: bool,
     /// The contact, cause and force of an event that is being resolved, where they decide on the mode that follows.
     forced: Option<(usize, Cause, [Y::Scalar; 3])>,
     /// Whether the last event was one of redundant forces that changed nothing, so that the next step goes on.
@@ -331,6 +334,7 @@ where
             p: p.clone(),
             left: inner.per_contact(Watched::zero()),
             right: inner.per_contact(Watched::zero()),
+            end: inner.per_contact(Watched::zero()),
             turning: [zero; 2],
             departures: inner.per_contact(departure),
             touching: Touches::new(inner),
@@ -339,6 +343,7 @@ where
             settling: zero,
             slipping: zero,
             immobile: false,
+            rests: false,
             forced: None,
             unchanged: false,
             crowded: (t, 0),
@@ -498,7 +503,7 @@ where
             return Ok(());
         }
         let (t, h) = (self.solver.time(), self.solver.last_step().1);
-        self.immobile = system.at_rest();
+        self.immobile = self.rests;
         if self.immobile {
             let Hybrid { solver, start, .. } = self;
             solver.resume(system, t, &start.1, &start.2)?;

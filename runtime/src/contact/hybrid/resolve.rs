@@ -42,6 +42,9 @@ where
             rest: None,
         };
         system.look(t, &self.q, &self.p);
+        if found.cause == Cause::Slipped {
+            system.loads(t, &self.q, true);
+        }
         let own = !system.redundant || system.shares() || found.cause == Cause::Stopped;
         self.forced = own.then(|| (found.contact, found.cause, system.at.forces.as_ref()[found.contact]));
         self.settle_modes(system, t, Some(&mut event))?;

@@ -59,6 +59,13 @@ impl<S: Real> Watched<S> {
         Watched { first: S::zero(), rate: S::zero(), speed: S::zero(), second: None }
     }
 
+    /// Whether the gap cannot have closed in the `h` s between here and a later point, with twice the speeds at both.
+    fn apart(&self, later: &Self, h: S) -> bool {
+        let least = if self.first < later.first { self.first } else { later.first };
+        let fastest = if self.rate.abs() > later.rate.abs() { self.rate.abs() } else { later.rate.abs() };
+        least > S::constant(2.0) * h * fastest
+    }
+
     fn value(&self, which: usize) -> Option<S> {
         if which == 0 {
             Some(self.first)
@@ -121,6 +128,7 @@ where
             return Ok(None);
         }
         self.sample(system, one, true);
+        self.rests = system.at_rest();
         let (_, h) = self.solver.last_step();
         let fastest = self.turning[0].to_f64().max(self.turning[1].to_f64());
         let turn = h.to_f64().abs() * fastest / TURN;
@@ -131,11 +139,19 @@ where
         if !(turn < MOST_STRETCHES) {
             return Err(HybridError::TurnsTooFar { time: self.solver.last_step().0.to_f64(), angle: turn * TURN });
         }
+        // The last stretch ends there too.
+        let (end, last_turning) = (self.end.as_mut(), self.turning[1]);
+        end.copy_from_slice(self.right.as_ref());
         let stretches = libm::ceil(turn).max(f64::from(STRETCHES)) as u32;
         let mut from = zero;
         for j in 1..=stretches {
             let to = Y::Scalar::constant(f64::from(j) / f64::from(stretches));
-            self.sample(system, to, true);
+            if j < stretches {
+                self.sample(system, to, true);
+            } else {
+                self.right.as_mut().copy_from_slice(self.end.as_ref());
+                self.turning[1] = last_turning;
+            }
             let mut first: Option<Found<Y::Scalar>> = None;
             for k in 0..self.left.as_ref().len() {
                 for which in 0..2 {
@@ -222,15 +238,9 @@ where
         self.turning[0] = self.turning[1];
     }
 
-    /// Whether no gap can have closed within a step of `h` s, with twice the speeds at its ends.
+    /// Whether no gap can have closed within a step of `h` s.
     fn apart(&self, h: Y::Scalar) -> bool {
-        let ends = self.left.as_ref().iter().zip(self.right.as_ref());
-        let two = Y::Scalar::constant(2.0);
-        ends.fold(true, |apart, (a, b)| {
-            let least = if a.first < b.first { a.first } else { b.first };
-            let fastest = if a.rate.abs() > b.rate.abs() { a.rate.abs() } else { b.rate.abs() };
-            apart && least > two * h * fastest
-        })
+        self.left.as_ref().iter().zip(self.right.as_ref()).all(|(a, b)| a.apart(b, h))
     }
 
     /// The first zero of a function between two points of the step, at whose ends `self.left` and `self.right` are.
@@ -255,8 +265,9 @@ where
         let value = move |w: &Watched<Y::Scalar>| w.value(which).unwrap_or(zero);
         let mut end = (to, at_b);
         if !(at_b <= zero) {
-            // Both ends are positive: only a gap with a minimum between them can have been zero.
-            if mode != Mode::Open || !(a.rate < zero && b.rate > zero) {
+            // Both ends are positive: only a gap with a minimum between them can have been zero, if the bodies are near.
+            let h = (to - from) * self.solver.last_step().1;
+            if mode != Mode::Open || !(a.rate < zero && b.rate > zero) || a.apart(&b, h) {
                 return None;
             }
             let lowest = self.root(system, k, (from, -a.rate), (to, -b.rate), |w| -w.rate);

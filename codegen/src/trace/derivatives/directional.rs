@@ -6,9 +6,9 @@ use mbd_runtime::sweep::{Inputs, Sweeps};
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::{Dual, Scalar};
 
-use super::inputs::SymbolicInputs;
 use crate::plan::Plan;
 use crate::symbolic::{Expr, Graph};
+use crate::trace::SymbolicInputs;
 
 /// Numbers that do not change.
 fn fixed<'g>(x: &[Expr<'g>]) -> Vec<Dual<Expr<'g>>> {
