@@ -176,10 +176,10 @@ function show(instant, isNew) {
 }
 
 /** What a question has answered becomes what is shown. */
-function answered({ numbers }, fresh = false) {
+function answered({ numbers, seen = [] }, fresh = false) {
   if (!numbers || !page.scene) return;
   if (fresh) page.history = [];
-  show(new Instant(page.scene, numbers), true);
+  for (const each of [...seen, numbers]) show(new Instant(page.scene, each), true);
 }
 
 /** Whether forces are shown. */
@@ -272,7 +272,7 @@ function tick(now) {
       page.busy = true;
       page.debt -= count * page.settings.step;
       const scene = page.scene;
-      change({ action: "frame", steps: count, most: 60, hand: page.hold?.hand ?? null }).then((answer) => {
+      change({ action: "frame", steps: count, most: 60, each: Math.max(1, Math.round(page.speed / 60 / page.settings.step)), hand: page.hold?.hand ?? null }).then((answer) => {
         page.busy = false;
         if (!answer || scene !== page.scene) return;
         const behind = answer.done < count && !answer.trouble;

@@ -14,12 +14,16 @@ const actions = {
     if (ok) engine.settings(settings);
     return { ok, text, numbers: ok ? engine.look(forces) : null, meshes: ok ? engine.meshes() : [] };
   },
-  /** Steps, with the hand that holds a body moved before. */
-  frame({ steps, most, forces, hand }) {
-    const begin = performance.now();
+  /** Steps, with the hand that holds a body moved before; what is seen after every `each` of them, however rarely is drawn. */
+  frame({ steps, most, each = steps, forces, hand }) {
+    const begin = performance.now(), seen = [];
     if (hand) engine.exports.pull_to(...hand);
-    const { done, trouble } = engine.advance(steps, most);
-    return { numbers: engine.look(forces), done, trouble, spent: performance.now() - begin };
+    for (let done = 0; ; ) {
+      const some = Math.min(each, steps - done), got = engine.advance(some, most - (performance.now() - begin));
+      done += got.done;
+      seen.push(engine.look(forces));
+      if (done === steps || got.done < some) return { numbers: seen.pop(), seen, done, trouble: got.trouble, spent: performance.now() - begin };
+    }
   },
   state({ t, values, forces }) {
     engine.setState(t, values);
@@ -45,7 +49,7 @@ const actions = {
 onmessage = async ({ data }) => {
   try {
     const answer = await actions[data.action](data);
-    postMessage({ id: data.id, answer }, answer.numbers ? [answer.numbers.buffer] : []);
+    postMessage({ id: data.id, answer }, [...(answer.seen ?? []), ...(answer.numbers ? [answer.numbers] : [])].map((numbers) => numbers.buffer));
   } catch (error) {
     // The state of a machine that has stopped is not known: the page starts another.
     postMessage({ id: data.id, error: String(error?.message ?? error) });

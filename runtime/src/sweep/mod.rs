@@ -86,6 +86,9 @@ pub enum Quantity {
 
 /// Is told where the sweep stands. `()` listens to nothing.
 pub trait Trace {
+    /// Whether it listens at all.
+    const LISTENS: bool = true;
+
     /// The next operations belong to this node (`None`: the ground) and quantity.
     fn at(&self, _node: Option<usize>, _what: Quantity) {}
     /// A value of the node where the sweep stands is an entry of something that has a letter: `m` and `xx`; the entry
@@ -94,7 +97,9 @@ pub trait Trace {
     fn name<S: Scalar>(&self, _value: S, _letter: &'static str, _entry: &'static str) {}
 }
 
-impl Trace for () {}
+impl Trace for () {
+    const LISTENS: bool = false;
+}
 
 /// What is given with every call beside the state.
 #[derive(Clone, Copy, Debug)]

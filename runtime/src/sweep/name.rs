@@ -12,14 +12,17 @@ const LINEAR_PAIRS: [&str; 6] = ["xx", "xy", "xz", "yy", "yz", "zz"];
 const ANGULAR_PAIRS: [&str; 6] = ["rx_rx", "rx_ry", "rx_rz", "ry_ry", "ry_rz", "rz_rz"];
 const MIXED_PAIRS: [[&str; 3]; 3] = [["rx_x", "rx_y", "rx_z"], ["ry_x", "ry_y", "ry_z"], ["rz_x", "rz_y", "rz_z"]];
 
-fn entries<S: Scalar, const N: usize>(
-    trace: &impl Trace,
+fn entries<S: Scalar, T: Trace, const N: usize>(
+    trace: &T,
     letter: &'static str,
     names: [&'static str; N],
     values: &[S; N],
 ) {
-    for (name, value) in names.into_iter().zip(values) {
-        trace.name(*value, letter, name);
+    // Compilers that prefer small code leave a loop over nothing.
+    if T::LISTENS {
+        for (name, value) in names.into_iter().zip(values) {
+            trace.name(*value, letter, name);
+        }
     }
 }
 
@@ -43,8 +46,8 @@ pub fn motion<S: Scalar>(trace: &impl Trace, letter: &'static str, m: &Motion<S>
 /// An inertia.
 pub fn inertia<S: Scalar>(trace: &impl Trace, letter: &'static str, m: &ArticulatedInertia<S>) {
     entries(trace, letter, LINEAR_PAIRS, &m.a);
-    for (names, row) in MIXED_PAIRS.into_iter().zip(&m.h) {
-        entries(trace, letter, names, row);
+    for k in 0..3 {
+        entries(trace, letter, MIXED_PAIRS[k], &m.h[k]);
     }
     entries(trace, letter, ANGULAR_PAIRS, &m.j);
 }
