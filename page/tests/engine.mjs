@@ -4,7 +4,9 @@ import { packed } from "../scripts.mjs";
 
 const view = new URL("../../cli/src/view/", import.meta.url), read = (name) => readFileSync(new URL(name, view));
 const { unlzma } = new Function(`${read("unpack.js")}; return { unlzma };`)();
-export const module = await WebAssembly.compile(unlzma(read("page.wasm.lzma")));
+/** The engine's bytes, as a page unpacks them. */
+export const unpacked = () => unlzma(read("page.wasm.lzma"));
+export const module = await WebAssembly.compile(unpacked());
 const make = new Function(`${read("engine.js")}; return makeEngine;`)();
 
 /** Whether the packed scripts are those of the folder. */
