@@ -129,7 +129,7 @@ class Figure {
   forces(instant, look, ink, extent) {
     const red = [...rgb(ink.force), 1], blue = [...rgb(ink.text), 1];
     for (const { point, force, contact } of instant.arrows())
-      if ((contact ? look.forces : look.reactions) && size(force) > 1e-3 * this.weight()) this.canvas.arrow(point, times(this.forceScale(), force), 0.007 * extent, contact ? red : blue);
+      if ((contact ? look.forces : look.reactions) && size(force) > 1e-3 * this.weight()) this.canvas.arrow(point, times(this.forceScale() * (contact ? 2 : 1), force), 0.007 * extent, contact ? red : blue);
   }
 
   /** Weight of all bodies, N, or that of a kilogram each in free fall. */
@@ -138,7 +138,7 @@ class Figure {
     return Math.max(mass, 1e-9) * (size(this.scene.gravity) || 1);
   }
 
-  /** m for each N: the weight of the mechanism is a third of its size. */
+  /** m for each N: the weight of the mechanism is a third of its size. Several contacts carry it, whose arrows are twice as long. */
   forceScale() {
     return (0.33 * this.scene.extent) / this.weight();
   }
