@@ -14,7 +14,7 @@ import { chromium } from "./chromium.mjs";
 const PICTURES = [
   ["models/double_pendulum.toml", 4, { trace: -1, near: 0.7 }],
   ["models/ur5.urdf", 0, { yaw: -0.7, near: 0.85 }],
-  ["models/g1.urdf", 0, { more: ["--base", "floating"], yaw: 0.5 }],
+  ["models/g1.urdf", 0, { more: ["--base", "floating"] }],
   ["models/solo12.urdf", 0, { more: ["--base", "floating"], near: 0.85 }],
   ["models/panda.urdf", 0, { near: 0.85 }],
   ["models/iiwa14.urdf", 0.4, { near: 0.8 }],

@@ -107,7 +107,8 @@ async function open(files, options = {}) {
   page.history = [];
   page.efforts = scene.velocities.map(() => 0);
   page.hold = null;
-  if (!before) Object.assign(page.look, { traceOf: -1, follow: false });
+  // What nothing holds falls out of sight.
+  if (!before) Object.assign(page.look, { traceOf: -1, follow: !scene.supports.length && !scene.contacts.length });
   const instant = new Instant(scene, answer.numbers);
   measure(scene, instant);
   visualise();
@@ -352,7 +353,7 @@ function overlay(ink) {
     }
   }
   // Axes of the ground and gravity, as they are seen.
-  const narrow = w < 700, centre = [narrow ? 40 : 52, h - (narrow ? 92 : 118)], length = narrow ? 22 : 30;
+  const narrow = w < 700, centre = [narrow ? 40 : 52, h - (narrow ? 108 : 118)], length = narrow ? 22 : 30;
   const arrow = (way, colour, name) => {
     const [u, v] = [dot(way, canvas.right) * length, -dot(way, canvas.up) * length], [x, y] = [centre[0] + u, centre[1] + v];
     c.strokeStyle = c.fillStyle = colour;
