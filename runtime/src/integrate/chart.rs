@@ -13,6 +13,7 @@
 //! Bogfjellmo and Marthinsen, *High-order symplectic partitioned Lie group methods*, 2016, section 2, with Cayley's map
 //! in place of the exponential: its inverse differential is a polynomial.
 
+use super::combine::{combine, Start};
 use super::lie_joint::normalise;
 use super::StepError;
 use crate::constant::Constant;
@@ -73,8 +74,7 @@ impl<Y: System> Point<Y> {
     /// `self = h Σ wⱼ k_j` over the pairs `(j, wⱼ)`.
     #[inline]
     pub fn combine(&mut self, h: Y::Scalar, weights: &[(usize, Constant)], k: &[Self]) {
-        combine(self.x.as_mut(), h, weights, |j| k.get(j).map_or(&[], |k| k.x.as_ref()));
-        combine(self.p.as_mut(), h, weights, |j| k.get(j).map_or(&[], |k| k.p.as_ref()));
+        combine([self.x.as_mut(), self.p.as_mut()], None, h, weights, k);
     }
 
     /// `self *= w`.
@@ -88,41 +88,25 @@ impl<Y: System> Point<Y> {
     }
 }
 
-/// `out = h Σ wⱼ k(j)`, a few components at a time, so that their sums stay in registers. Every `k(j)` is as long as
-/// `out`: where the compiler cannot know that, there must not be a panic path either.
-#[inline(always)]
-fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, Constant)], k: impl Fn(usize) -> &'a [S]) {
-    // The sum starts at minus zero: minus zero plus a term is that term, and the compiler removes this addition. It
-    // could not remove an addition of plus zero.
-    let nothing = -S::zero();
-    let whole = out.len() - out.len() % 4;
-    let mut chunks = out.chunks_exact_mut(4);
-    for (out, at) in chunks.by_ref().zip((0..).step_by(4)) {
-        let mut sum = [nothing; 4];
-        for &(j, w) in weights {
-            let w: S = w.get();
-            let Some(k) = k(j).get(at..).and_then(|k| k.first_chunk::<4>()) else { continue };
-            for l in 0..4 {
-                sum[l] = sum[l] + w * k[l];
-            }
-        }
-        for (out, sum) in out.iter_mut().zip(sum) {
-            *out = h * sum;
-        }
-    }
-    for (out, at) in chunks.into_remainder().iter_mut().zip(whole..) {
-        let term = |j: usize, w: Constant| k(j).get(at).map_or(nothing, |k| w.get::<S>() * *k);
-        *out = h * weights.iter().fold(nothing, |sum, &(j, w)| sum + term(j, w));
-    }
-}
-
 impl<Y: System> Point<Y>
 where
     Y::Scalar: Real,
 {
     /// Index of the first component that is not finite, momenta after coordinates.
     pub fn not_finite(&self) -> Option<usize> {
-        self.parts().into_iter().flatten().position(|x| !x.is_finite())
+        // A product with zero is not a number where the other factor is not finite: one sum for all, and no branch.
+        let zero = Y::Scalar::zero();
+        let sum = |sum, part: &[Y::Scalar]| part.iter().fold(sum, |sum, x| sum + *x * zero);
+        match sum(sum(zero, self.x.as_ref()), self.p.as_ref()).is_finite() {
+            true => None,
+            false => Self::find_not_finite(self.parts()),
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn find_not_finite(parts: [&[Y::Scalar]; 2]) -> Option<usize> {
+        parts.into_iter().flatten().position(|x| !x.is_finite())
     }
 }
 
@@ -209,6 +193,11 @@ where
         }
     }
 
+    /// Whether nothing is carried over from rounded sums.
+    pub(super) fn is_exact(&self) -> bool {
+        self.carry.is_none()
+    }
+
     /// The state that displacements start from as the chart stores it: momenta of Lie joints in outer axes.
     pub(super) fn held(&self) -> (&[Y::Scalar], &[Y::Scalar]) {
         (self.q.as_ref(), self.p.as_ref())
@@ -245,6 +234,21 @@ where
                 group.inward(q, group.shift(x), p.as_mut());
             }
         }
+    }
+
+    /// State at the displacement `h Σ wⱼ k_j` over the pairs `(j, wⱼ)` in one pass, without the displacement being
+    /// stored, for systems all of whose displacements are added.
+    #[inline(always)]
+    pub(super) fn stage(
+        &self,
+        h: Y::Scalar,
+        (weights, k): (&[(usize, Constant)], &[Point<Y>]),
+        q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
+    ) {
+        let carry = self.carry.as_ref().map(Point::parts);
+        let start = Start { state: [self.q.as_ref(), self.p.as_ref()], carry };
+        combine([q.as_mut(), p.as_mut()], Some(start), h, weights, k);
     }
 
     /// Rates of the displacement from those of the state `(q, p)` it leads to: `q̇`, and `ṗ` at the place of its
@@ -299,19 +303,15 @@ where
             return Err(StepError::NotFinite { time, index });
         }
         let (q, x) = (self.q.as_mut(), point.x.as_ref());
-        let mut carry = self.carry.as_mut().map(|c| (c.x.as_mut(), c.p.as_mut()));
+        let (mut cx, mut cp) = self.carry.as_mut().map_or((None, None), |c| (Some(c.x.as_mut()), Some(c.p.as_mut())));
         for (at, v, n, group) in Stretches::new(system.lie_joints(), q.len(), x.len()) {
-            for k in 0..n {
-                sum(&mut q[at + k], x[v + k], carry.as_mut().map(|c| &mut c.0[v + k]));
-            }
+            add(&mut q[at..at + n], &x[v..v + n], cx.as_mut().map(|c| &mut c[v..v + n]));
             if let Some(group) = group {
                 group.advance(x, q);
             }
         }
         let p = self.p.as_mut();
-        for (k, (p, dp)) in p.iter_mut().zip(point.p.as_ref()).enumerate() {
-            sum(p, *dp, carry.as_mut().map(|c| &mut c.1[k]));
-        }
+        add(p, point.p.as_ref(), cp.as_deref_mut());
         for group in system.lie_joints() {
             group.refer(group.shift(x), p);
         }
@@ -422,17 +422,22 @@ fn displaced<S: Scalar>(base: &[S], x: &[S], carry: Option<&[S]>, out: &mut [S])
     }
 }
 
-/// `total += x`, with what the last sums lost; keeps what this one loses. Kahan, *Further remarks on reducing
-/// truncation errors*, 1965.
-#[inline]
-fn sum<S: Real>(total: &mut S, x: S, carry: Option<&mut S>) {
+/// `total += x`, with what the last sums lost, if that is carried on; keeps what these lose.
+#[inline(always)]
+fn add<S: Real>(total: &mut [S], x: &[S], carry: Option<&mut [S]>) {
     match carry {
-        None => *total = *total + x,
-        Some(carry) => {
-            let x = x + *carry;
-            let new = *total + x;
-            *carry = x - (new - *total);
-            *total = new;
-        }
+        None => total.iter_mut().zip(x).for_each(|(total, x)| *total = *total + *x),
+        Some(carry) => add_compensated(total, x, carry),
+    }
+}
+
+/// Kahan, *Further remarks on reducing truncation errors*, 1965. A function of its own, so that there is one copy of it.
+#[inline(never)]
+fn add_compensated<S: Real>(total: &mut [S], x: &[S], carry: &mut [S]) {
+    for ((total, x), carry) in total.iter_mut().zip(x).zip(carry) {
+        let x = *x + *carry;
+        let new = *total + x;
+        *carry = x - (new - *total);
+        *total = new;
     }
 }

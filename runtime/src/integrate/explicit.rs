@@ -205,14 +205,16 @@ where
         h: Y::Scalar,
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
-        self.start_rate(step, system, t);
         // The last stage of a pair whose last stage is the rate at the end only serves the estimate and the next step.
         let stages = if T::TABLEAU.fsal && scale.is_none() { S - 1 } else { S };
-        for i in 1..stages {
+        // The rate at the start is the first stage; a second call for it would be a second copy of inlined rates.
+        for i in usize::from(step.start_known)..stages {
             let (known, rest) = self.k.split_at_mut(i);
-            self.stage.combine(h, T::WEIGHTS.a[i].list(), known);
-            step.field.rates(system, t + T::TABLEAU.c[i].get::<Y::Scalar>() * h, &self.stage, &mut rest[0]);
+            let time = t + T::TABLEAU.c[i].get::<Y::Scalar>() * h;
+            let row = (T::WEIGHTS.a[i].list(), &*known);
+            step.field.stage_rates(system, (time, h), row, &mut self.stage, &mut rest[0]);
         }
+        step.start_known = true;
         step.delta.combine(h, T::WEIGHTS.b.list(), &self.k);
         self.extra_known = false;
         if T::TABLEAU.fsal && stages == S {
