@@ -97,16 +97,10 @@ where
         // A product with zero is not a number where the other factor is not finite: one sum for all, and no branch.
         let zero = Y::Scalar::zero();
         let sum = |sum, part: &[Y::Scalar]| part.iter().fold(sum, |sum, x| sum + *x * zero);
-        match sum(sum(zero, self.x.as_ref()), self.p.as_ref()).is_finite() {
-            true => None,
-            false => Self::find_not_finite(self.parts()),
+        if sum(sum(zero, self.x.as_ref()), self.p.as_ref()).is_finite() {
+            return None;
         }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn find_not_finite(parts: [&[Y::Scalar]; 2]) -> Option<usize> {
-        parts.into_iter().flatten().position(|x| !x.is_finite())
+        self.parts().into_iter().flatten().position(|x| !x.is_finite())
     }
 }
 
@@ -303,15 +297,19 @@ where
             return Err(StepError::NotFinite { time, index });
         }
         let (q, x) = (self.q.as_mut(), point.x.as_ref());
-        let (mut cx, mut cp) = self.carry.as_mut().map_or((None, None), |c| (Some(c.x.as_mut()), Some(c.p.as_mut())));
+        let mut carry = self.carry.as_mut().map(|c| (c.x.as_mut(), c.p.as_mut()));
         for (at, v, n, group) in Stretches::new(system.lie_joints(), q.len(), x.len()) {
-            add(&mut q[at..at + n], &x[v..v + n], cx.as_mut().map(|c| &mut c[v..v + n]));
+            for k in 0..n {
+                sum(&mut q[at + k], x[v + k], carry.as_mut().map(|c| &mut c.0[v + k]));
+            }
             if let Some(group) = group {
                 group.advance(x, q);
             }
         }
         let p = self.p.as_mut();
-        add(p, point.p.as_ref(), cp.as_deref_mut());
+        for (k, (p, dp)) in p.iter_mut().zip(point.p.as_ref()).enumerate() {
+            sum(p, *dp, carry.as_mut().map(|c| &mut c.1[k]));
+        }
         for group in system.lie_joints() {
             group.refer(group.shift(x), p);
         }
@@ -422,22 +420,17 @@ fn displaced<S: Scalar>(base: &[S], x: &[S], carry: Option<&[S]>, out: &mut [S])
     }
 }
 
-/// `total += x`, with what the last sums lost, if that is carried on; keeps what these lose.
-#[inline(always)]
-fn add<S: Real>(total: &mut [S], x: &[S], carry: Option<&mut [S]>) {
+/// `total += x`, with what the last sums lost; keeps what this one loses. Kahan, *Further remarks on reducing
+/// truncation errors*, 1965.
+#[inline]
+fn sum<S: Real>(total: &mut S, x: S, carry: Option<&mut S>) {
     match carry {
-        None => total.iter_mut().zip(x).for_each(|(total, x)| *total = *total + *x),
-        Some(carry) => add_compensated(total, x, carry),
-    }
-}
-
-/// Kahan, *Further remarks on reducing truncation errors*, 1965. A function of its own, so that there is one copy of it.
-#[inline(never)]
-fn add_compensated<S: Real>(total: &mut [S], x: &[S], carry: &mut [S]) {
-    for ((total, x), carry) in total.iter_mut().zip(x).zip(carry) {
-        let x = *x + *carry;
-        let new = *total + x;
-        *carry = x - (new - *total);
-        *total = new;
+        None => *total = *total + x,
+        Some(carry) => {
+            let x = x + *carry;
+            let new = *total + x;
+            *carry = x - (new - *total);
+            *total = new;
+        }
     }
 }
