@@ -413,11 +413,17 @@ fn for_positions<Y: System>(system: &Y, nv: usize, mut with: impl FnMut(usize)) 
 /// `out = base + (x + carry)`.
 #[inline(always)]
 fn displaced<S: Scalar>(base: &[S], x: &[S], carry: Option<&[S]>, out: &mut [S]) {
-    let pairs = out.iter_mut().zip(base.iter().zip(x));
     match carry {
-        None => pairs.for_each(|(out, (base, x))| *out = *base + *x),
-        Some(carry) => pairs.zip(carry).for_each(|((out, (base, x)), carry)| *out = *base + (*x + *carry)),
+        None => out.iter_mut().zip(base.iter().zip(x)).for_each(|(out, (base, x))| *out = *base + *x),
+        Some(carry) => displaced_by_both(base, x, carry, out),
     }
+}
+
+/// [`displaced`] where sums are compensated: one copy, so that the code of a small processor stays small.
+#[inline(never)]
+fn displaced_by_both<S: Scalar>(base: &[S], x: &[S], carry: &[S], out: &mut [S]) {
+    let pairs = out.iter_mut().zip(base.iter().zip(x.iter().zip(carry)));
+    pairs.for_each(|(out, (base, (x, carry)))| *out = *base + (*x + *carry));
 }
 
 /// `total += x`, with what the last sums lost; keeps what this one loses. Kahan, *Further remarks on reducing
