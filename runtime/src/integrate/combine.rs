@@ -17,6 +17,10 @@ pub(super) struct Start<'a, S> {
     pub carry: Option<Parts<'a, S>>,
 }
 
+/// Whether code may use vectors of more than 16 bytes: generated code writes its results in pairs, and what reads a
+/// vector wider than what was written into it waits until that is in the cache.
+const NARROW: bool = cfg!(target_feature = "avx");
+
 /// `out = start + h Σ wⱼ k_j` over the pairs `(j, wⱼ)`, in one pass: a few coordinates and as many momenta at a time, so
 /// that their sums stay in registers, and by pairs at the end, so that who reads the result as vectors finds vectors.
 /// Every list is as long as its part of `out`: where the compiler cannot know that, there must not be a panic path
@@ -30,10 +34,10 @@ pub(super) fn combine<Y: System>(
     k: &[Point<Y>],
 ) {
     let mut at = 0;
-    while some::<Y, 4>(&mut out, at, start, h, weights, k) {
+    while !NARROW && some::<Y, 4>(&mut out, at, start, h, weights, k) {
         at += 4;
     }
-    if some::<Y, 2>(&mut out, at, start, h, weights, k) {
+    while some::<Y, 2>(&mut out, at, start, h, weights, k) {
         at += 2;
     }
     some::<Y, 1>(&mut out, at, start, h, weights, k);
