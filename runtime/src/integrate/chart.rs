@@ -420,6 +420,7 @@ fn displaced<S: Scalar>(base: &[S], x: &[S], carry: Option<&[S]>, out: &mut [S])
 }
 
 /// [`displaced`] where sums are compensated: one copy, so that the code of a small processor stays small.
+#[cold]
 #[inline(never)]
 fn displaced_by_both<S: Scalar>(base: &[S], x: &[S], carry: &[S], out: &mut [S]) {
     let pairs = out.iter_mut().zip(base.iter().zip(x.iter().zip(carry)));
