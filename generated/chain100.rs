@@ -4165,6 +4165,12 @@ impl ::multibody::runtime::System for Chain100 {
     }
 
     #[inline]
+    fn rates_by_velocities(&mut self, _t: f64, q: &[f64; 100], p: &[f64; 100], v: &mut [f64; 100], pd: &mut [f64; 100]) -> bool {
+        Self::rates(self, q, p, v, pd);
+        true
+    }
+
+    #[inline]
     fn rates_in_lanes<const LANES: usize>(&mut self, _t: &[f64; LANES], q: &[[f64; LANES]], p: &[[f64; LANES]], qd: &mut [[f64; LANES]], pd: &mut [[f64; LANES]]) -> bool {
         let Ok(q) = <&[[f64; LANES]; 100] as ::core::convert::TryFrom<_>>::try_from(q) else { return false };
         let Ok(p) = <&[[f64; LANES]; 100] as ::core::convert::TryFrom<_>>::try_from(p) else { return false };

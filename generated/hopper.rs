@@ -2005,6 +2005,12 @@ impl ::multibody::runtime::System for Hopper {
     }
 
     #[inline]
+    fn rates_by_velocities(&mut self, _t: f64, q: &[f64; 2], p: &[f64; 2], v: &mut [f64; 2], pd: &mut [f64; 2]) -> bool {
+        Self::rates(self, q, p, v, pd);
+        true
+    }
+
+    #[inline]
     fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
         match part {
             ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),

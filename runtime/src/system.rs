@@ -105,6 +105,19 @@ pub trait System {
         qd: &mut Self::Coordinates,
         pd: &mut Self::Momenta,
     );
+    /// [`System::rates_at`] where coordinate rates are the velocities, which are then written to `v`. Returns whether it
+    /// has computed them: generated code does where it has no Lie joints, so that integrators need not copy them.
+    #[inline]
+    fn rates_by_velocities(
+        &mut self,
+        _t: Self::Scalar,
+        _q: &Self::Coordinates,
+        _p: &Self::Momenta,
+        _v: &mut Self::Momenta,
+        _pd: &mut Self::Momenta,
+    ) -> bool {
+        false
+    }
     /// Rates of several states at once, side by side: `q[k][l]` is coordinate `k` of the state in lane `l`, which is at
     /// time `t[l]`, s. `q` and `qd` have `nq` rows, `p` and `pd` `nv`. Returns whether it has computed them: generated
     /// code does, in vector registers and with the bits of [`System::rates_at`]; others evaluate one state after the

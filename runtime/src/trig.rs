@@ -114,7 +114,9 @@ macro_rules! sincos {
         pub fn $pairs<A: Arithmetic, const L: usize, const N: usize>(
             x: &[[$float; L]; N],
         ) -> ([[$float; L]; N], [[$float; L]; N]) {
-            let (mut sin, mut cos) = ([[0.0; L]; N], [[0.0; L]; N]);
+            // Without vectors, any numbers that are at hand: a small processor would call a function to write zeros.
+            let start = if VECTORS { [[0.0; L]; N] } else { *x };
+            let (mut sin, mut cos) = (start, start);
             if $flat::<A>(x.as_flattened(), sin.as_flattened_mut(), cos.as_flattened_mut()) {
                 // Copies are lent, so that the arrays of the main path can stay in registers.
                 let (x, mut s, mut c) = (*x, sin, cos);

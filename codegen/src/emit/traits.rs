@@ -96,6 +96,15 @@ impl Writer<'_> {
                 &format!("rates_at(&mut self, _t: {t}, q: &{q}, p: &{v}, qd: &mut {q}, pd: &mut {v})"),
                 "Self::rates(self, q, p, qd, pd);",
             ),
+            match joints.is_empty() && q == v {
+                true => method(
+                    &format!(
+                        "rates_by_velocities(&mut self, _t: {t}, q: &{q}, p: &{v}, v: &mut {v}, pd: &mut {v}) -> bool"
+                    ),
+                    "Self::rates(self, q, p, v, pd);\n        true",
+                ),
+                false => String::new(),
+            },
             rates.map_or_else(String::new, |rates| self.rates_in_lanes(plan, rates)),
             method(
                 &format!("part_name(&self, part: {part}) -> Option<&str>"),

@@ -13,6 +13,7 @@
 //! Bogfjellmo and Marthinsen, *High-order symplectic partitioned Lie group methods*, 2016, section 2, with Cayley's map
 //! in place of the exponential: its inverse differential is a polynomial.
 
+use super::combine::{combine, Start};
 use super::lie_joint::normalise;
 use super::StepError;
 use crate::constant::Constant;
@@ -73,8 +74,7 @@ impl<Y: System> Point<Y> {
     /// `self = h Σ wⱼ k_j` over the pairs `(j, wⱼ)`.
     #[inline]
     pub fn combine(&mut self, h: Y::Scalar, weights: &[(usize, Constant)], k: &[Self]) {
-        combine(self.x.as_mut(), h, weights, |j| k.get(j).map_or(&[], |k| k.x.as_ref()));
-        combine(self.p.as_mut(), h, weights, |j| k.get(j).map_or(&[], |k| k.p.as_ref()));
+        combine([self.x.as_mut(), self.p.as_mut()], None, h, weights, k);
     }
 
     /// `self *= w`.
@@ -88,40 +88,18 @@ impl<Y: System> Point<Y> {
     }
 }
 
-/// `out = h Σ wⱼ k(j)`, a few components at a time, so that their sums stay in registers. Every `k(j)` is as long as
-/// `out`: where the compiler cannot know that, there must not be a panic path either.
-#[inline(always)]
-fn combine<'a, S: Scalar + 'a>(out: &mut [S], h: S, weights: &[(usize, Constant)], k: impl Fn(usize) -> &'a [S]) {
-    // The sum starts at minus zero: minus zero plus a term is that term, and the compiler removes this addition. It
-    // could not remove an addition of plus zero.
-    let nothing = -S::zero();
-    let whole = out.len() - out.len() % 4;
-    let mut chunks = out.chunks_exact_mut(4);
-    for (out, at) in chunks.by_ref().zip((0..).step_by(4)) {
-        let mut sum = [nothing; 4];
-        for &(j, w) in weights {
-            let w: S = w.get();
-            let Some(k) = k(j).get(at..).and_then(|k| k.first_chunk::<4>()) else { continue };
-            for l in 0..4 {
-                sum[l] = sum[l] + w * k[l];
-            }
-        }
-        for (out, sum) in out.iter_mut().zip(sum) {
-            *out = h * sum;
-        }
-    }
-    for (out, at) in chunks.into_remainder().iter_mut().zip(whole..) {
-        let term = |j: usize, w: Constant| k(j).get(at).map_or(nothing, |k| w.get::<S>() * *k);
-        *out = h * weights.iter().fold(nothing, |sum, &(j, w)| sum + term(j, w));
-    }
-}
-
 impl<Y: System> Point<Y>
 where
     Y::Scalar: Real,
 {
     /// Index of the first component that is not finite, momenta after coordinates.
     pub fn not_finite(&self) -> Option<usize> {
+        // A product with zero is not a number where the other factor is not finite: one sum for all, and no branch.
+        let zero = Y::Scalar::zero();
+        let sum = |sum, part: &[Y::Scalar]| part.iter().fold(sum, |sum, x| sum + *x * zero);
+        if sum(sum(zero, self.x.as_ref()), self.p.as_ref()).is_finite() {
+            return None;
+        }
         self.parts().into_iter().flatten().position(|x| !x.is_finite())
     }
 }
@@ -209,6 +187,11 @@ where
         }
     }
 
+    /// Whether nothing is carried over from rounded sums.
+    pub(super) fn is_exact(&self) -> bool {
+        self.carry.is_none()
+    }
+
     /// The state that displacements start from as the chart stores it: momenta of Lie joints in outer axes.
     pub(super) fn held(&self) -> (&[Y::Scalar], &[Y::Scalar]) {
         (self.q.as_ref(), self.p.as_ref())
@@ -245,6 +228,21 @@ where
                 group.inward(q, group.shift(x), p.as_mut());
             }
         }
+    }
+
+    /// State at the displacement `h Σ wⱼ k_j` over the pairs `(j, wⱼ)` in one pass, without the displacement being
+    /// stored, for systems all of whose displacements are added.
+    #[inline(always)]
+    pub(super) fn stage(
+        &self,
+        h: Y::Scalar,
+        (weights, k): (&[(usize, Constant)], &[Point<Y>]),
+        q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
+    ) {
+        let carry = self.carry.as_ref().map(Point::parts);
+        let start = Start { state: [self.q.as_ref(), self.p.as_ref()], carry };
+        combine([q.as_mut(), p.as_mut()], Some(start), h, weights, k);
     }
 
     /// Rates of the displacement from those of the state `(q, p)` it leads to: `q̇`, and `ṗ` at the place of its
@@ -415,11 +413,18 @@ fn for_positions<Y: System>(system: &Y, nv: usize, mut with: impl FnMut(usize)) 
 /// `out = base + (x + carry)`.
 #[inline(always)]
 fn displaced<S: Scalar>(base: &[S], x: &[S], carry: Option<&[S]>, out: &mut [S]) {
-    let pairs = out.iter_mut().zip(base.iter().zip(x));
     match carry {
-        None => pairs.for_each(|(out, (base, x))| *out = *base + *x),
-        Some(carry) => pairs.zip(carry).for_each(|((out, (base, x)), carry)| *out = *base + (*x + *carry)),
+        None => out.iter_mut().zip(base.iter().zip(x)).for_each(|(out, (base, x))| *out = *base + *x),
+        Some(carry) => displaced_by_both(base, x, carry, out),
     }
+}
+
+/// [`displaced`] where sums are compensated: one copy, so that the code of a small processor stays small.
+#[cold]
+#[inline(never)]
+fn displaced_by_both<S: Scalar>(base: &[S], x: &[S], carry: &[S], out: &mut [S]) {
+    let pairs = out.iter_mut().zip(base.iter().zip(x.iter().zip(carry)));
+    pairs.for_each(|(out, (base, (x, carry)))| *out = *base + (*x + *carry));
 }
 
 /// `total += x`, with what the last sums lost; keeps what this one loses. Kahan, *Further remarks on reducing

@@ -12,9 +12,14 @@ use crate::system::{Real, System};
 pub trait Method<const S: usize, const X: usize> {
     /// Coefficients of the method.
     const TABLEAU: &'static Tableau<S>;
-    /// Those that are not zero, row by row. They are computed at compile time, so that they are not in writable memory;
-    /// where a loop over few stages is unrolled, the weights become operands.
-    const WEIGHTS: &'static Rows<S> = &Rows::new(Self::TABLEAU);
+    /// The weights of the stages that are not zero, row by row. These tables are computed at compile time, so that they
+    /// are not in writable memory; where a loop over few stages is unrolled, the weights become operands. Tables of their
+    /// own: the image of a small processor holds those that are read.
+    const STAGES: &'static [Weights<S>; S] = &Weights::rows(&Self::TABLEAU.a);
+    /// Those of the step.
+    const STEP: &'static Weights<S> = &Weights::new(&Self::TABLEAU.b);
+    /// Those of the error estimates, of which there are two at most.
+    const ERRORS: &'static [Weights<S>; 2] = &Weights::rows(Self::TABLEAU.error);
 }
 
 macro_rules! methods {
@@ -57,36 +62,9 @@ pub struct Explicit<Y: System, T, const S: usize, const X: usize> {
     method: core::marker::PhantomData<T>,
 }
 
-/// The weights of a [`Tableau`] that are not zero.
-#[derive(Clone, Copy, Debug)]
-pub struct Rows<const S: usize> {
-    a: [Weights<S>; S],
-    b: Weights<S>,
-    /// Of the error estimates, of which there are two at most.
-    error: [Weights<S>; 2],
-}
-
-impl<const S: usize> Rows<S> {
-    const fn new(tableau: &Tableau<S>) -> Self {
-        let none = Weights::new(&[Constant::ZERO; S]);
-        let mut rows = Rows { a: [none; S], b: Weights::new(&tableau.b), error: [none; 2] };
-        let mut i = 0;
-        while i < S {
-            rows.a[i] = Weights::new(&tableau.a[i]);
-            i += 1;
-        }
-        let mut i = 0;
-        while i < tableau.error.len() {
-            rows.error[i] = Weights::new(&tableau.error[i]);
-            i += 1;
-        }
-        rows
-    }
-}
-
 /// Weights that are not zero, with the stages they belong to.
 #[derive(Clone, Copy, Debug)]
-struct Weights<const S: usize> {
+pub struct Weights<const S: usize> {
     list: [(usize, Constant); S],
     n: usize,
 }
@@ -101,6 +79,17 @@ impl<const S: usize> Weights<S> {
                 out.n += 1;
             }
             stage += 1;
+        }
+        out
+    }
+
+    /// Of as many rows as there are; the others are empty.
+    const fn rows<const N: usize>(rows: &[[Constant; S]]) -> [Self; N] {
+        let mut out = [Weights { list: [(0, Constant::ZERO); S], n: 0 }; N];
+        let mut row = 0;
+        while row < rows.len() {
+            out[row] = Weights::new(&rows[row]);
+            row += 1;
         }
         out
     }
@@ -133,7 +122,7 @@ where
     /// 10.17).
     fn error(&mut self, h: Y::Scalar, scale: &Point<Y>) -> f64 {
         let mut norms = [0.0; 2];
-        for (norm_, weights) in norms.iter_mut().zip(&T::WEIGHTS.error).take(T::TABLEAU.error.len()) {
+        for (norm_, weights) in norms.iter_mut().zip(T::ERRORS).take(T::TABLEAU.error.len()) {
             self.stage.combine(h, weights.list(), &self.k);
             *norm_ = norm(&self.stage, scale);
         }
@@ -205,15 +194,17 @@ where
         h: Y::Scalar,
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
-        self.start_rate(step, system, t);
         // The last stage of a pair whose last stage is the rate at the end only serves the estimate and the next step.
         let stages = if T::TABLEAU.fsal && scale.is_none() { S - 1 } else { S };
-        for i in 1..stages {
+        // The rate at the start is the first stage; a second call for it would be a second copy of inlined rates.
+        for i in usize::from(step.start_known)..stages {
             let (known, rest) = self.k.split_at_mut(i);
-            self.stage.combine(h, T::WEIGHTS.a[i].list(), known);
-            step.field.rates(system, t + T::TABLEAU.c[i].get::<Y::Scalar>() * h, &self.stage, &mut rest[0]);
+            let time = t + T::TABLEAU.c[i].get::<Y::Scalar>() * h;
+            let row = (T::STAGES[i].list(), &*known);
+            step.field.stage_rates(system, (time, h), row, &mut self.stage, &mut rest[0]);
         }
-        step.delta.combine(h, T::WEIGHTS.b.list(), &self.k);
+        step.start_known = true;
+        step.delta.combine(h, T::STEP.list(), &self.k);
         self.extra_known = false;
         if T::TABLEAU.fsal && stages == S {
             step.end.copy_from(&self.k[S - 1]);

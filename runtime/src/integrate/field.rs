@@ -2,6 +2,7 @@
 
 use super::chart::{Chart, Point};
 use super::StepError;
+use crate::constant::Constant;
 use crate::system::{Real, System};
 
 /// The rates of a system in the chart about a state, and the number of their evaluations.
@@ -52,24 +53,37 @@ where
     /// # Errors
     /// [`StepError::Quaternion`].
     pub fn load(&mut self, system: &Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
-        if !self.holds(q, p) {
+        // Where nothing is carried over, it is less work to copy a state than to compare it.
+        let known = !(Self::is_plain(system) && self.chart.is_exact()) && self.holds(system, q, p);
+        if !known {
             self.chart.load(system, t.to_f64(), q, p)?;
         }
         self.stored = false;
         Ok(())
     }
 
+    /// Whether the chart's state is the state itself, because all displacements are added.
+    fn is_plain(system: &Y) -> bool {
+        system.lie_joints().is_empty()
+    }
+
     /// Whether a state is the one that [`Field::store`] gave last, and nothing has been evaluated since. Methods with
     /// a history then continue.
-    pub fn holds(&self, q: &Y::Coordinates, p: &Y::Momenta) -> bool {
-        self.stored && self.q.as_ref() == q.as_ref() && self.p.as_ref() == p.as_ref()
+    pub fn holds(&self, system: &Y, q: &Y::Coordinates, p: &Y::Momenta) -> bool {
+        let (q0, p0) = match Self::is_plain(system) {
+            true => self.chart.held(),
+            false => (self.q.as_ref(), self.p.as_ref()),
+        };
+        self.stored && q0 == q.as_ref() && p0 == p.as_ref()
     }
 
     /// Copies the state from which displacements start.
     pub fn store(&mut self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
-        self.chart.base(system, &mut self.q, &mut self.p);
-        q.as_mut().copy_from_slice(self.q.as_ref());
-        p.as_mut().copy_from_slice(self.p.as_ref());
+        self.chart.base(system, q, p);
+        if !Self::is_plain(system) {
+            self.q.as_mut().copy_from_slice(q.as_ref());
+            self.p.as_mut().copy_from_slice(p.as_ref());
+        }
         self.stored = true;
     }
 
@@ -85,9 +99,38 @@ where
     #[inline]
     pub fn rates(&mut self, system: &mut Y, t: Y::Scalar, point: &Point<Y>, out: &mut Point<Y>) {
         self.chart.state(system, point, &mut self.q, &mut self.p);
-        system.rates_at(t, &self.q, &self.p, &mut self.qd, &mut out.p);
+        self.evaluate(system, t, point, out);
+    }
+
+    /// Rates at time `t` (s) and the displacement `h Σ wⱼ k_j` over the pairs `(j, wⱼ)`. Overwrites `stage`, where the
+    /// displacement is stored if it takes more than addition to reach the state there.
+    #[inline(always)]
+    pub(super) fn stage_rates(
+        &mut self,
+        system: &mut Y,
+        (t, h): (Y::Scalar, Y::Scalar),
+        (weights, k): (&[(usize, Constant)], &[Point<Y>]),
+        stage: &mut Point<Y>,
+        out: &mut Point<Y>,
+    ) {
+        if Self::is_plain(system) {
+            self.chart.stage(h, (weights, k), &mut self.q, &mut self.p);
+        } else {
+            stage.combine(h, weights, k);
+            self.chart.state(system, stage, &mut self.q, &mut self.p);
+        }
+        self.evaluate(system, t, stage, out);
+    }
+
+    /// Rates at the state `(q, p)` of this field, to which the displacement `point` leads.
+    #[inline(always)]
+    fn evaluate(&mut self, system: &mut Y, t: Y::Scalar, point: &Point<Y>, out: &mut Point<Y>) {
         self.stored = false;
         self.evaluations += 1;
+        if system.rates_by_velocities(t, &self.q, &self.p, &mut out.x, &mut out.p) {
+            return;
+        }
+        system.rates_at(t, &self.q, &self.p, &mut self.qd, &mut out.p);
         self.chart.rates(system, point, (&self.q, &self.p), &self.qd, out);
     }
 

@@ -244,7 +244,7 @@ where
     }
 
     fn resume(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
-        if S::MULTISTEP && self.step.field.holds(q, p) {
+        if S::MULTISTEP && self.step.field.holds(system, q, p) {
             return self.step.field.load(system, t, q, p);
         }
         self.begin(system, t, q, p)

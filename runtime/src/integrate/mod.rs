@@ -28,6 +28,7 @@
 mod adams;
 pub mod chart;
 mod collocation;
+mod combine;
 mod control;
 mod doubling;
 mod energy_projection;
