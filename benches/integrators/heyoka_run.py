@@ -84,33 +84,52 @@ def momenta(mbd, model, snap, q, v):
     return json.loads(answer)["states"][0]["p"]
 
 
-def race(scene, variant, system, start, end, rounds, angles):
-    for tolerance in TOLERANCES:
+def race(scene, variant, system, start, end, angles, tolerances=TOLERANCES):
+    """Integrators of one scene, compiled: for each what its line says, and a function that runs it once."""
+    for tolerance in tolerances:
         integrator = hy.taylor_adaptive(system, start, tol=tolerance)
-        begin, times, steps = time.thread_time(), [], 0
-        while len(times) < rounds and (not times or time.thread_time() - begin < BUDGET):
+
+        def run(integrator=integrator):
             integrator.state[:], integrator.time = start, 0.0
             at = time.thread_time()
             steps = integrator.propagate_until(end)[3]
-            times.append(time.thread_time() - at)
-        print(json.dumps({
-            "tool": "heyoka", "version": version("heyoka"), "scene": scene, "variant": variant, "method": "taylor",
-            "setting": f"tol={tolerance:.1e} order={integrator.order}", "cpu_s": min(times), "steps": steps,
-            "t_end": end, "q": angles(list(integrator.state))}), flush=True)
+            return time.thread_time() - at, steps, angles(list(integrator.state))
+
+        yield {"tool": "heyoka", "version": version("heyoka"), "scene": scene, "variant": variant, "method": "taylor",
+               "setting": f"tol={tolerance:.1e} order={integrator.order}", "t_end": end}, run
 
 
-def main(mbd, rounds, work):
+def timed(line, run, rounds):
+    """The line of one integrator, with the least time of several runs."""
+    begin, times, steps, q = time.thread_time(), [], 0, []
+    while len(times) < rounds and (not times or time.thread_time() - begin < BUDGET):
+        spent, steps, q = run()
+        times.append(spent)
+    return json.dumps({**line, "cpu_s": min(times), "steps": steps, "q": q})
+
+
+def races(mbd, work, scenes=None, tolerances=TOLERANCES):
+    """Integrators of all scenes, or of some; those of the arms where their files are in WORK."""
     start, end = [0.5, -0.3], 10.0
-    race("double_pendulum", "absolute angles", double_pendulum(), [start[0], sum(start), 0.0, 0.0], end, rounds,
-         lambda y: [y[0], y[1] - y[0]])
+    if not scenes or "double_pendulum" in scenes:
+        yield from race("double_pendulum", "absolute angles", double_pendulum(), [start[0], sum(start), 0.0, 0.0], end,
+                        lambda y: [y[0], y[1] - y[0]], tolerances)
     at_rest = ("double_pendulum", ROOT / "models/double_pendulum.toml", end, start, [0.0, 0.0], [])
     arms = [("ur5", 5.0, 6), ("panda_arm", 1.0, 7)]
     moving = [(name, work / f"{name}.urdf", end, [0.3 * (-1) ** k for k in range(n)], [0.5] * n, ["--snap", "1e-6"])
               for name, end, n in arms] if work else []
     for scene, model, end, q, v, snap in [at_rest, *moving]:
+        if scenes and scene not in scenes:
+            continue
         system = equations(mbd, model, snap)
         n = len(q)
-        race(scene, "generated operations", system, [*q, *momenta(mbd, model, snap, q, v)], end, rounds, lambda y: y[:n])
+        yield from race(scene, "generated operations", system, [*q, *momenta(mbd, model, snap, q, v)], end,
+                        lambda y, n=n: y[:n], tolerances)
+
+
+def main(mbd, rounds, work):
+    for line, run in races(mbd, work):
+        print(timed(line, run, rounds), flush=True)
 
 
 if __name__ == "__main__":

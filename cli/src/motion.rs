@@ -398,6 +398,10 @@ fn go(
             });
         }
         driver.state(system, &mut q, &mut p);
+        if std::mem::take(&mut system.reordered) {
+            observer.mechanism.reorder_rows(&q);
+            observer.driven.reorder_rows(&q);
+        }
         observer.end(end, h, &q, &p, kept);
         if row <= rows && at(row) <= end + 1e-9 * h {
             observer.row(at(row), &q, &p);

@@ -29,6 +29,8 @@ pub struct Timed {
     inner: Driven,
     /// Whether calls are for dense output rather than for steps.
     pub output: bool,
+    /// Whether the order of its rows has changed.
+    pub reordered: bool,
     /// Time of reading the clock once, s.
     clock: f64,
     /// Times in steps, and in output.
@@ -46,6 +48,7 @@ impl Timed {
         Timed {
             inner,
             output: false,
+            reordered: false,
             clock,
             rates: Default::default(),
             derivatives: Clocked::default(),
@@ -121,6 +124,11 @@ impl Constrained for Timed {
     }
     fn multipliers(&mut self, t: f64, q: &Vec<f64>, v: &Vec<f64>, lambda: &mut Vec<f64>) {
         self.inner.multipliers(t, q, v, lambda);
+    }
+    fn reorder_rows(&mut self, q: &Vec<f64>) -> bool {
+        let changed = self.inner.reorder_rows(q);
+        self.reordered |= changed;
+        changed
     }
 }
 

@@ -74,6 +74,7 @@ impl Machines {
     /// Keeps one for later, after a call that has set these of [`FIELDS`].
     pub fn give_back(&self, mut machine: Compiled, fields: impl Iterator<Item = usize>) {
         machine.set_drives(None);
+        machine.restore_row_order();
         let drives = FIELDS.iter().enumerate().filter(|(_, field)| ["drive_q", "drive_v"].contains(&field.array.name));
         fields.chain(drives.map(|(at, _)| at)).for_each(|field| set(&mut machine, field, &self.defaults[field]));
         machine.inputs().tau.fill(0.0);

@@ -226,6 +226,7 @@ impl Motion<'_> {
     /// Computes one row. After a failure the rest of it is not a number.
     fn row(&self, memory: &mut Memory, mut item: Item, beat: &mut Beat) -> Result<(), Failed> {
         let Memory { machine, touching, .. } = memory;
+        machine.restore_row_order();
         self.fields.iter().for_each(|(field, rows)| set(machine, *field, rows.row(item.0)));
         machine.inputs().tau.fill(0.0);
         if let Some(moving) = self.moving {

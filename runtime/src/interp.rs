@@ -13,6 +13,7 @@ use crate::spatial::Motion;
 use crate::sweep::{Derivatives, FrameState, Inputs, Sweeps};
 use crate::system::{Accelerated, Conjugate, Constrained, Differentiable, Energetic};
 use crate::system::{LieGroup, LieJoint, MomentumDerivatives, Part, Real, Row, StateDerivatives, System};
+use crate::tree::row_order::RowProducts;
 use crate::tree::{Kind, Source, Tree};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -193,6 +194,20 @@ impl<S: Scalar> Interpreter<S> {
     pub fn accelerations(&mut self, q: &[S], v: &[S], a: &mut [S]) {
         let sweeps = Sweeps { tree: self.tree.for_accelerations(), trace: &() };
         sweeps.accelerations(q, v, &inputs!(self), &mut self.work, a);
+    }
+
+    /// Residuals of the constraints and entries of `Φ`, `q → (φ, Φ)`: [`Constrained::constraint_residuals`], also for
+    /// scalars that cannot be compared.
+    pub fn residuals(&mut self, q: &[S], residual: &mut [S], entries: &mut [S]) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.constraint_residuals(q, &inputs!(self), &mut self.work, residual, entries);
+    }
+
+    /// Forces and moments of the constraints, `(q, v) → λ`: [`Constrained::multipliers`], also for scalars that cannot be
+    /// compared.
+    pub fn constraint_multipliers(&mut self, q: &[S], v: &[S], lambda: &mut [S]) {
+        let sweeps = Sweeps { tree: self.tree.for_accelerations(), trace: &() };
+        sweeps.multipliers(q, v, &inputs!(self), &mut self.work, &mut self.v, lambda);
     }
 
     /// `(q, v) → (v̇, reaction wrenches)`: `[force; moment]` transmitted by every joint to its child, in the child's
@@ -414,7 +429,7 @@ impl<S: Scalar + core::fmt::Debug> Accelerated for Interpreter<S> {
     }
 }
 
-impl<S: Scalar + core::fmt::Debug> Constrained for Interpreter<S> {
+impl<S: Real> Constrained for Interpreter<S> {
     type Rows = Vec<S>;
     type Entries = Vec<S>;
 
@@ -435,8 +450,7 @@ impl<S: Scalar + core::fmt::Debug> Constrained for Interpreter<S> {
     }
 
     fn constraint_residuals(&mut self, q: &Vec<S>, residual: &mut Vec<S>, jacobian: &mut Vec<S>) {
-        let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.constraint_residuals(q, &inputs!(self), &mut self.work, residual, jacobian);
+        self.residuals(q, residual, jacobian);
     }
 
     fn project_momenta(&mut self, _t: S, q: &Vec<S>, p: &mut Vec<S>, v: &mut Vec<S>, sigma: &mut Vec<S>) {
@@ -451,8 +465,20 @@ impl<S: Scalar + core::fmt::Debug> Constrained for Interpreter<S> {
     }
 
     fn multipliers(&mut self, _t: S, q: &Vec<S>, v: &Vec<S>, lambda: &mut Vec<S>) {
-        let sweeps = Sweeps { tree: self.tree.for_accelerations(), trace: &() };
-        sweeps.multipliers(q, v, &inputs!(self), &mut self.work, &mut self.v, lambda);
+        self.constraint_multipliers(q, v, lambda);
+    }
+
+    fn reorder_rows(&mut self, q: &Vec<S>) -> bool {
+        if !self.tree.rows_can_be_ordered() {
+            return false;
+        }
+        let at = RowProducts::new(self, q);
+        let changed = self.tree.reorder_rows(&at);
+        if self.physical.reorder_rows(&at) || changed {
+            self.work = Workspace::new(&self.tree);
+            (self.derivatives, self.dual) = (None, None);
+        }
+        changed
     }
 }
 

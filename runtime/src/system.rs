@@ -376,4 +376,11 @@ pub trait Constrained: System {
     );
     /// Multipliers `λ` at given velocities: forces and moments of the constraints, `Φᵀλ = τ − M v̇ − h`.
     fn multipliers(&mut self, t: Self::Scalar, q: &Self::Coordinates, v: &Self::Momenta, lambda: &mut Self::Rows);
+    /// Chooses the order in which rows are eliminated anew, by their pivots at `q`, and returns whether it has changed.
+    /// [`crate::constrained::Projection`] calls it at the end of a step where a row has lost most of its pivot. The
+    /// interpreter and machine code made at run time can do that; code generated ahead of time keeps its order, and
+    /// returns `false`.
+    fn reorder_rows(&mut self, _q: &Self::Coordinates) -> bool {
+        false
+    }
 }

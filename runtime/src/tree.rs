@@ -6,6 +6,7 @@
 
 mod elimination;
 mod map;
+pub mod row_order;
 mod unrolled;
 
 use alloc::vec::Vec;

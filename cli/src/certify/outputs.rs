@@ -1,7 +1,7 @@
 //! The outputs over any scalar, as one list of numbers, and their names.
 
 use multibody::codegen::plan::Plan;
-use multibody::runtime::{Constrained, Interpreter, Scalar};
+use multibody::runtime::{Interpreter, Scalar};
 
 use super::input::Values;
 use crate::args::Quantity;
@@ -90,13 +90,14 @@ pub fn evaluate<S: Scalar + core::fmt::Debug>(
                 all.extend(force);
             }
             Quantity::Residuals => {
-                let (mut phi, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
-                interpreter.constraint_residuals(q, &mut phi, &mut entries);
+                let (rows, entries) = (interpreter.tree().dims.rows, interpreter.tree().entry_columns().len());
+                let (mut phi, mut entries) = (zeros(rows), zeros(entries));
+                interpreter.residuals(q, &mut phi, &mut entries);
                 all.extend(phi);
             }
             Quantity::Multipliers => {
-                let mut lambda = interpreter.zero_rows();
-                interpreter.multipliers(S::zero(), q, v, &mut lambda);
+                let mut lambda = zeros(interpreter.tree().dims.rows);
+                interpreter.constraint_multipliers(q, v, &mut lambda);
                 all.extend(lambda);
             }
         }

@@ -149,6 +149,9 @@ impl Constrained for Driven {
         }
         self.inner.multipliers(t, q, v, lambda);
     }
+    fn reorder_rows(&mut self, q: &Vec<f64>) -> bool {
+        self.inner.reorder_rows(q)
+    }
 }
 
 impl Differentiable for Driven {

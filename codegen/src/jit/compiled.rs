@@ -3,6 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use mbd_runtime::contact::{Reducible, Way};
+use mbd_runtime::tree::row_order::RowProducts;
 use mbd_runtime::Interpreter;
 
 use super::instructions::INPUTS;
@@ -39,6 +40,10 @@ const MOST_BODIES: usize = MOST_OPERATIONS / 50;
 #[derive(Clone, Debug)]
 pub struct Compiled<S: Number = f64> {
     pub(super) shared: Arc<Shared<S>>,
+    /// The code with the rows in the order of the plan, where [`Constrained::reorder_rows`] has found another one.
+    ///
+    /// [`Constrained::reorder_rows`]: mbd_runtime::Constrained::reorder_rows
+    planned: Option<Arc<Shared<S>>>,
     pub(super) interpreter: Interpreter<S>,
     /// Whether the interpreter computes everything.
     interpreted: bool,
@@ -70,6 +75,12 @@ pub(super) struct Shared<S> {
 }
 
 impl<S: Number> Shared<S> {
+    /// Nothing is compiled yet.
+    fn new(plan: Plan, options: Options, sizes: Sizes) -> Self {
+        let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
+        Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new(), lanes: OnceLock::new() }
+    }
+
     /// Compiles a program.
     fn machine_code(&self, program: &OutputProgram<Code>, lanes: usize) -> Result<MachineCode<S>, CompileError> {
         let results = program.spec.results.iter().map(|array| array.len(&self.sizes)).collect();
@@ -128,12 +139,10 @@ impl<S: Number> Compiled<S> {
         let sizes = sizes(&plan, &options, frames);
         let params: Vec<S> = plan.default_params().into_iter().map(S::constant).collect();
         let interpreter = plan.interpreter(&params);
-        let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
-        let shared =
-            Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new(), lanes: OnceLock::new() };
-        let (acts, shared) = (vec![S::one(); sizes.acts], Arc::new(shared));
+        let (acts, shared) = (vec![S::one(); sizes.acts], Arc::new(Shared::new(plan, options, sizes)));
         Ok(Compiled {
             shared,
+            planned: None,
             interpreter,
             interpreted: false,
             patience: 0,
@@ -190,6 +199,11 @@ impl<S: Number> Compiled<S> {
     /// If there is another number of them than the model has.
     pub fn set_parameters(&mut self, params: &[S]) {
         self.params.copy_from_slice(params);
+        self.set_interpreter(params);
+    }
+
+    /// Makes the interpreter of the plan with parameters, and the inputs that it has now.
+    fn set_interpreter(&mut self, params: &[S]) {
         let old = &self.interpreter;
         let mut new = self.shared.plan.interpreter(params);
         new.tau.clone_from(&old.tau);
@@ -305,6 +319,43 @@ impl<S: Number> Compiled<S> {
         *calls == self.patience
     }
 
+    /// Chooses the order of the rows anew at coordinates `q`, if that changes it; then the code is made again when it is
+    /// next called.
+    pub(super) fn with_rows_ordered_at(&mut self, q: &Vec<S>) -> bool {
+        if !self.interpreter.tree().rows_can_be_ordered() {
+            return false;
+        }
+        let mut plan = self.shared.plan.clone();
+        if !plan.reorder_rows(&RowProducts::new(&mut self.interpreter, q)) {
+            return false;
+        }
+        let options = self.shared.options.clone();
+        let shared = Arc::new(Shared::new(plan, options, self.shared.sizes));
+        let old = std::mem::replace(&mut self.shared, shared);
+        self.planned.get_or_insert(old);
+        self.code_has_changed();
+        true
+    }
+
+    /// Gives the rows of the constraints the order of the plan again, where [`Constrained::reorder_rows`] has changed it:
+    /// what is computed then does not depend on the motions that were computed before.
+    ///
+    /// [`Constrained::reorder_rows`]: mbd_runtime::Constrained::reorder_rows
+    pub fn restore_row_order(&mut self) {
+        if let Some(planned) = self.planned.take() {
+            self.shared = planned;
+            self.code_has_changed();
+        }
+    }
+
+    /// Takes the interpreter of the plan that the code has now.
+    fn code_has_changed(&mut self) {
+        let params = std::mem::take(&mut self.params);
+        self.set_interpreter(&params);
+        self.params = params;
+        self.calls.fill(0);
+    }
+
     /// The mechanism in which only some rows of the constraints act, one entry of `acts` for each row: with the
     /// parameters and the gravity of this one, and other inputs that are zero.
     fn with_rows(&self, acts: &[bool]) -> Self {
@@ -312,10 +363,8 @@ impl<S: Number> Compiled<S> {
         let Shared { plan, sizes, .. } = &*self.shared;
         let plan = plan.acting(acts);
         let interpreter = self.interpreter.acting(acts);
-        let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
-        let shared =
-            Shared { plan, options, sizes: *sizes, outputs, coordinate_rates: OnceLock::new(), lanes: OnceLock::new() };
-        Compiled { shared: Arc::new(shared), interpreter, calls: vec![0; self.calls.len()], ..self.clone() }
+        let shared = Arc::new(Shared::new(plan, options, *sizes));
+        Compiled { shared, planned: None, interpreter, calls: vec![0; self.calls.len()], ..self.clone() }
     }
 
     /// `q̇ = N(q) v`.

@@ -153,4 +153,9 @@ impl<S: Number> Constrained for Compiled<S> {
             self.interpreter.multipliers(t, q, v, lambda);
         }
     }
+
+    /// The code is made again, where the order has changed, in place of that of this clone.
+    fn reorder_rows(&mut self, q: &Vec<S>) -> bool {
+        self.with_rows_ordered_at(q)
+    }
 }

@@ -109,6 +109,8 @@ pub(super) struct Corrector<Y: Constrained> {
     pub nearness: Nearness<Y::Rows, Y::Scalar>,
     /// Whether the last state was near one.
     near: bool,
+    /// Whether the last end of a step has changed the order of the rows.
+    pub reordered: bool,
     #[cfg(feature = "alloc")]
     basic: Option<Basic<Y::Scalar>>,
 }
@@ -129,6 +131,7 @@ where
             singular: (0, None),
             nearness: Nearness::new(system.zero_rows()),
             near: false,
+            reordered: false,
             #[cfg(feature = "alloc")]
             basic: stabilisation.has_displacements().then(|| Basic::new(system)),
         }
@@ -178,6 +181,19 @@ where
             self.singular.1 = Some(SingularPosition { time: time.to_f64(), constraint, ranks });
         }
         self.noted = Some(Noted { t, step, rank });
+    }
+
+    /// Has the system order its rows anew where one of them has lost most of its pivot, at the end of a step that has
+    /// been noted.
+    pub fn reorder(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, pivots: &Y::Rows) {
+        if self.noted.is_none_or(|noted| noted.t != t) {
+            return;
+        }
+        self.reordered = self.nearness.asks_for_order(pivots.as_ref()) && system.reorder_rows(q);
+        if self.reordered {
+            // Roots of pivots in another order say nothing about the next ones.
+            self.roots.iter_mut().for_each(|roots| roots.as_mut().fill(Y::Scalar::zero()));
+        }
     }
 
     /// Computes the residuals, and the displacement that corrects them into `room.v`, in iteration `k`.

@@ -10,6 +10,8 @@ pub(super) struct Nearness<R, S> {
     rank: usize,
     /// The least part of its largest pivot that a row had when the momenta were freed; 1 far from singular positions.
     freed: S,
+    /// The same when the order of the rows was last looked at.
+    ordered: Option<S>,
 }
 
 impl<R: AsRef<[S]> + AsMut<[S]>, S: Real> Nearness<R, S> {
@@ -19,7 +21,7 @@ impl<R: AsRef<[S]> + AsMut<[S]>, S: Real> Nearness<R, S> {
 
     /// Far from singular positions; `zero` has an entry of zero for each row.
     pub fn new(zero: R) -> Self {
-        Nearness { largest: zero, rank: 0, freed: S::one() }
+        Nearness { largest: zero, rank: 0, freed: S::one(), ordered: None }
     }
 
     /// The least part that a row has of its largest pivot so far: of the rows that are independent, and of all.
@@ -43,6 +45,17 @@ impl<R: AsRef<[S]> + AsMut<[S]>, S: Real> Nearness<R, S> {
     /// Whether a row has lost nearly all of its pivot, or has been left out since.
     pub fn near(&mut self, pivots: &[S]) -> bool {
         self.least(pivots)[1] < S::constant(Self::STEP)
+    }
+
+    /// Whether the order of the rows must be looked at: at the start, and at every tenth of the part that a row has left
+    /// of its pivot, from a hundredth on.
+    pub fn asks_for_order(&mut self, pivots: &[S]) -> bool {
+        let ([least, _], step) = (self.least(pivots), S::constant(Self::STEP));
+        let asks = self.ordered.is_none_or(|ordered| least < step && least < S::constant(0.1) * ordered);
+        if asks || least > step {
+            self.ordered = Some(if least > step { S::one() } else { least });
+        }
+        asks
     }
 
     /// Whether the momenta must be freed at these pivots.

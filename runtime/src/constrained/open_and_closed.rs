@@ -77,6 +77,9 @@ impl<O, C: Constrained> Constrained for OpenAndClosed<O, C> {
     fn multipliers(&mut self, t: C::Scalar, q: &C::Coordinates, v: &C::Momenta, lambda: &mut C::Rows) {
         self.closed.multipliers(t, q, v, lambda);
     }
+    fn reorder_rows(&mut self, q: &C::Coordinates) -> bool {
+        self.closed.reorder_rows(q)
+    }
 }
 
 /// A constrained system that also gives its rates without constraints, for methods that find the multipliers

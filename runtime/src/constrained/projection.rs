@@ -17,7 +17,8 @@ use crate::Scalar;
 ///
 /// The policy `P` says how much work is done: [`ToTolerance`] iterates until the residuals are small, [`FixedWork`]
 /// always does the same, for processors with a fixed time budget. [`Stabilisation::Momenta`], [`Stabilisation::Mass`]
-/// and [`FixedWork`] allocate nothing.
+/// and [`FixedWork`] allocate nothing themselves. At the first step, and where a row has lost most of its pivot,
+/// [`ToTolerance`] has the system look at the order of its rows ([`Constrained::reorder_rows`]), which allocates.
 #[derive(Clone, Debug)]
 pub struct Projection<Y: Constrained, P = ToTolerance<Y>> {
     room: Room<Y>,
@@ -304,6 +305,7 @@ where
         }
         if closes || judged {
             self.corrector.note(system, t, &room.pivots);
+            self.corrector.reorder(system, t, q, &room.pivots);
         }
         self.gave_back = frees && remembers;
         if self.gave_back {
@@ -323,7 +325,8 @@ where
         if !self.gave_back {
             return Ok(false);
         }
-        if !self.corrector.nearness.asks(room.pivots.as_ref()) {
+        // Of redundant rows, another order gives the multipliers to others: rates of the past do not fit.
+        if !self.corrector.nearness.asks(room.pivots.as_ref()) && !self.corrector.reordered {
             return Ok(false);
         }
         system.project_momenta(t, q, p, &mut room.v, &mut room.sigma);

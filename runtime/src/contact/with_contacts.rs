@@ -527,4 +527,8 @@ impl<Y: Touching> Constrained for WithContacts<Y> {
     fn multipliers(&mut self, t: Y::Scalar, q: &Y::Coordinates, v: &Y::Momenta, lambda: &mut Y::Rows) {
         self.system.multipliers(t, q, v, lambda);
     }
+
+    fn reorder_rows(&mut self, q: &Y::Coordinates) -> bool {
+        self.system.reorder_rows(q)
+    }
 }
