@@ -22,7 +22,7 @@ impl<I: Instructions> Lowering<'_, I> {
             for first in (0..turns).step_by(self.target.width()) {
                 let input = |s: &mut Self, k: usize| s.of_branches(program, repeat, first, block.inputs[k]);
                 let put =
-                    |s: &mut Self, k: usize, value| s.to_branches(program, repeat, first, block.outputs[k], value);
+                    |s: &mut Self, k: usize, value| s.give_branches(program, repeat, first, block.outputs[k], value);
                 self.body(number, &block.program, input, put);
             }
             self.target.vectors(false);
@@ -72,7 +72,14 @@ impl<I: Instructions> Lowering<'_, I> {
     }
 
     /// Gives a vector of the branches from `first` on to an output of a block.
-    fn to_branches(&mut self, program: &RolledProgram, repeat: &Repeat, first: usize, target: Target, value: I::Value) {
+    fn give_branches(
+        &mut self,
+        program: &RolledProgram,
+        repeat: &Repeat,
+        first: usize,
+        target: Target,
+        value: I::Value,
+    ) {
         match target {
             Target::Row(row) => {
                 let at = self.entry(program, repeat.run, row, first);
