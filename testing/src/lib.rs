@@ -1,6 +1,7 @@
 //! Random mechanisms for the tests of the project: generator, states, and a writer of the TOML format.
 
 pub mod batch;
+pub mod branches;
 pub mod chains;
 pub mod closed;
 pub mod conformance;

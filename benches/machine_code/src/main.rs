@@ -2,15 +2,17 @@
 //!
 //!     cargo run --release --manifest-path benches/machine_code/Cargo.toml
 //!
-//! Both run in turns on the same random states, one after the other and as a chain in which every state waits for the
-//! rates of the one before. The least of many rounds counts.
+//! All run in turns on the same random states, one after the other and as a chain in which every state waits for the
+//! rates of the one before. The least of many rounds counts. Machine code is made twice: as users get it, and with like
+//! branches one after the other. Names of models choose some of them.
 
 use std::hint::black_box;
 use std::time::Instant;
 
 use mbd_codegen::jit::Compiled;
+use mbd_codegen::options::PlanOptions;
 use mbd_codegen::read::{self, Base, ImportOptions};
-use mbd_codegen::{Arithmetic, Options, Output};
+use mbd_codegen::{Arithmetic, LikeBranches, Options, Output};
 use mbd_runtime::System;
 
 const STATES: usize = 64;
@@ -70,28 +72,30 @@ where
     (0..STATES).map(state).collect()
 }
 
-/// Least times of both systems in many rounds, in turns.
-fn pair<A: System, B: System>(a: &mut A, b: &mut B, chained: bool) -> [f64; 2]
+/// Least times of machine code, of machine code of branches apart and of Rust in many rounds, in turns.
+fn least<B: System>([a, apart]: &mut [Compiled; 2], b: &mut B, chained: bool) -> [f64; 3]
 where
-    A::Coordinates: AsMut<[f64]>,
-    A::Momenta: AsMut<[f64]>,
     B::Coordinates: AsMut<[f64]>,
     B::Momenta: AsMut<[f64]>,
 {
     let (of_a, of_b) = (states(a), states(b));
-    let mut least = [f64::INFINITY; 2];
+    let mut least = [f64::INFINITY; 3];
     for _ in 0..ROUNDS {
         least[0] = least[0].min(time(a, &of_a, chained));
-        least[1] = least[1].min(time(b, &of_b, chained));
+        least[1] = least[1].min(time(apart, &of_a, chained));
+        least[2] = least[2].min(time(b, &of_b, chained));
     }
     least
 }
 
-fn compiled(path: &str, floating: bool, arithmetic: Arithmetic) -> Compiled {
+fn compiled(path: &str, floating: bool, arithmetic: Arithmetic, branches: LikeBranches) -> Compiled {
     let text = std::fs::read_to_string(format!("{}/{path}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
     let base = if floating { Base::Floating } else { Base::Fixed };
-    let model = read::model(path, &text, &ImportOptions { base, ..ImportOptions::default() }).expect("checked by the build").model;
-    let compiled = Compiled::new(&model, &Options { arithmetic, ..Options::default() }).expect("options");
+    let model = read::model(path, &text, &ImportOptions { base, ..ImportOptions::default() })
+        .expect("checked by the build")
+        .model;
+    let plan = PlanOptions { branches, ..PlanOptions::default() };
+    let compiled = Compiled::new(&model, &Options { arithmetic, plan, ..Options::default() }).expect("options");
     compiled.prepare(Output::Rates).expect("machine code");
     compiled
 }
@@ -104,25 +108,29 @@ macro_rules! models {
         })*
 
         fn main() {
-            println!("| model | arithmetic | independent: machine code | Rust | ratio | chained: machine code | Rust | ratio |");
-            println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
-            $(
-                row(stringify!($name), "exact", &mut compiled($path, $floating, Arithmetic::Exact), &mut $name::Exact::new());
-                row(stringify!($name), "fast", &mut compiled($path, $floating, Arithmetic::Fast), &mut $name::Fast::new());
-            )*
+            println!("| model | arithmetic | independent: machine code | branches apart | Rust | ratio | chained: machine code | branches apart | Rust | ratio |");
+            println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+            let chosen: Vec<String> = std::env::args().skip(1).collect();
+            let both = |path, floating, arithmetic| {
+                [LikeBranches::Auto, LikeBranches::Apart].map(|branches| compiled(path, floating, arithmetic, branches))
+            };
+            $(if chosen.is_empty() || chosen.iter().any(|name| name == stringify!($name)) {
+                row(stringify!($name), "exact", &mut both($path, $floating, Arithmetic::Exact), &mut $name::Exact::new());
+                row(stringify!($name), "fast", &mut both($path, $floating, Arithmetic::Fast), &mut $name::Fast::new());
+            })*
         }
     };
 }
 
-fn row<B: System>(name: &str, arithmetic: &str, machine: &mut Compiled, rust: &mut B)
+fn row<B: System>(name: &str, arithmetic: &str, machine: &mut [Compiled; 2], rust: &mut B)
 where
     B::Coordinates: AsMut<[f64]>,
     B::Momenta: AsMut<[f64]>,
 {
     print!("| {name} | {arithmetic} |");
     for chained in [false, true] {
-        let [m, r] = pair(machine, rust, chained);
-        print!(" {m:.0} ns | {r:.0} ns | {:.2} |", m / r);
+        let [m, apart, r] = least(machine, rust, chained);
+        print!(" {m:.0} ns | {apart:.0} ns | {r:.0} ns | {:.2} |", m / r);
     }
     println!();
 }

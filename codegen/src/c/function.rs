@@ -9,7 +9,7 @@ use crate::code::Code;
 use crate::emit::head::count_line;
 use crate::emit::names::Names;
 use crate::emit::Input;
-use crate::lower::{lower, Memory, Spills};
+use crate::lower::{lower, Memory};
 use crate::output::{flat_entry, Array, Dim, OutputProgram};
 use crate::rolled::RolledProgram;
 
@@ -64,8 +64,7 @@ impl Function<'_> {
         }
         lines.extend(count_line(&self.program.program.counts()));
         if let Code::Rolled(_) = self.program.program {
-            let bytes =
-                self.input.options.precision.bytes() * Memory::new(&self.program.program, &Spills::default(), 1).len();
+            let bytes = self.input.options.precision.bytes() * Memory::new(&self.program.program, &[], 1, 1).len();
             lines.push(format!("Working memory on the stack: {bytes} bytes."));
         }
         lines
@@ -96,7 +95,7 @@ impl Function<'_> {
             ..Writer::new(prefix, precision)
         };
         let lengths: Vec<usize> = spec.results.iter().map(|array| array.len(&input.programs.sizes)).collect();
-        lower(&mut writer, program, &lengths, &Spills::default());
+        lower(&mut writer, program, &lengths, &[]);
         writer.close();
         let mut out = format!("{}\n{{\n", self.declaration());
         let read: BTreeSet<&str> = writer.read.iter().map(|k| program.inputs[*k].name).collect();
@@ -135,7 +134,7 @@ impl Function<'_> {
             }
             let _ = writeln!(out, "    }};");
         }
-        let memory = Memory::new(&self.program.program, &Spills::default(), 1);
+        let memory = Memory::new(&self.program.program, &[], 1, 1);
         let arrays = ["angles", "sines", "cosines"].map(|name| (name.to_string(), memory.angles));
         let rows = memory.rows.iter().enumerate().map(|(k, len)| (format!("rows{k}"), *len));
         for (name, len) in arrays.into_iter().chain([("kept".to_string(), memory.kept)]).chain(rows) {

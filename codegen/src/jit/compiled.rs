@@ -6,7 +6,7 @@ use mbd_runtime::contact::{Reducible, Way};
 use mbd_runtime::tree::row_order::RowProducts;
 use mbd_runtime::Interpreter;
 
-use super::instructions::INPUTS;
+use super::instructions::{width, INPUTS};
 use super::lanes::LanesCode;
 use super::memory::{MachineCode, Number};
 use super::CompileError;
@@ -15,7 +15,7 @@ use crate::model::{Gravity, Model};
 use crate::options::Options;
 use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
-use crate::rolled::rolled;
+use crate::rolled::{rolled, together};
 use crate::search;
 use crate::trace::{chosen_frames, coordinate_rates, sizes};
 
@@ -46,7 +46,7 @@ pub struct Compiled<S: Number = f64> {
     planned: Option<Arc<Shared<S>>>,
     pub(super) interpreter: Interpreter<S>,
     /// Whether the interpreter computes everything.
-    interpreted: bool,
+    pub(super) interpreted: bool,
     /// Number of calls of an output that the interpreter computes before the output is compiled.
     patience: u32,
     /// Calls of each of [`Output::ALL`], counted up to that number.
@@ -93,7 +93,18 @@ impl<S: Number> Shared<S> {
         if plan.nodes.len() > MOST_BODIES && rolled(plan, output, options).is_none() {
             return Err(CompileError::TooLarge { output, operations: None, most });
         }
-        let program = compile(plan, output, options)?;
+        let mut program = compile(plan, output, options)?;
+        if let Code::Straight(straight) = &program.program {
+            let width = width(S::PRECISION, 1);
+            if let Some(both) = together(plan, output, options).filter(|b| b.program.pays_in(width, straight, options))
+            {
+                // Every state has the same bits, alone or in a lane.
+                program = both.map(|both| match lanes {
+                    1 => Code::Rolled(both.program),
+                    _ => Code::Straight(both.apart),
+                });
+            }
+        }
         let operations = program.program.operations().count();
         match operations > most {
             true => Err(CompileError::TooLarge { output, operations: Some(operations), most }),
@@ -156,7 +167,7 @@ impl<S: Number> Compiled<S> {
     }
 
     /// The same mechanism, whose traits are computed by the interpreter alone, for comparison. In exact arithmetic it
-    /// gives the same bits. [`Compiled::evaluate`] still runs machine code.
+    /// gives the same bits. [`Compiled::evaluate`] still runs machine code, [`Compiled::evaluate_or_interpret`] does not.
     #[must_use]
     pub fn interpreted(self) -> Self {
         Compiled { interpreted: true, ..self }
@@ -250,50 +261,6 @@ impl<S: Number> Compiled<S> {
         let scratch = long_enough(&mut self.scratch, code);
         call(code, [given(0), given(1), given(2)], (&self.interpreter, &self.params, &self.acts), results, scratch);
         Ok(())
-    }
-
-    /// Velocities and rates of the state, `(q, p) → (v, q̇, ṗ)`.
-    ///
-    /// # Panics
-    /// As [`Compiled::velocities`].
-    pub fn rates(&mut self, q: &[S], p: &[S], v: &mut [S], qd: &mut [S], pd: &mut [S]) {
-        if self.run(Output::Rates, [q, p, &[]], &mut [qd, pd]) {
-            self.velocities(q, p, v);
-        } else {
-            self.interpreter.rates(q, p, v, qd, pd);
-        }
-    }
-
-    /// Velocities from momenta, `(q, p) → v`.
-    ///
-    /// # Panics
-    /// If a slice has another length than the mechanism has coordinates or velocities.
-    pub fn velocities(&mut self, q: &[S], p: &[S], v: &mut [S]) {
-        if !self.run(Output::Velocities, [q, p, &[]], &mut [v]) {
-            self.interpreter.velocities(q, p, v);
-        }
-    }
-
-    /// Bias forces, `(q, v) → h` with `M v̇ + h = τ`.
-    ///
-    /// # Panics
-    /// As [`Compiled::velocities`].
-    pub fn bias(&mut self, q: &[S], v: &[S], h: &mut [S]) {
-        if !self.run(Output::Bias, [q, v, &[]], &mut [h]) {
-            self.interpreter.bias(q, v, h);
-        }
-    }
-
-    /// Kinetic and potential energy, `(q, p) → (kinetic, potential)`, J.
-    ///
-    /// # Panics
-    /// As [`Compiled::velocities`].
-    pub fn energy(&mut self, q: &[S], p: &[S]) -> (S, S) {
-        let mut energy = [S::zero(); 2];
-        match self.run(Output::Energy, [q, p, &[]], &mut [&mut energy]) {
-            true => (energy[0], energy[1]),
-            false => self.interpreter.energy(q, p),
-        }
     }
 
     /// Computes an output that one of the traits asks for, whose arrays are right. Returns whether there is code for

@@ -41,14 +41,24 @@ pub struct Shape<'a> {
     pub results: &'a [usize],
     /// Working memory.
     pub memory: &'a Memory,
-    /// Values that leave the registers.
-    pub spills: &'a Spills,
-    /// Addresses of the tables of rolled code.
-    pub tables: &'a [usize],
-    /// Places of constants, by their bits, in their table.
+    /// Values of each block that leave the registers.
+    pub spills: &'a [Spills],
+    /// Places of constants, by their bits, in the function's table.
     pub constants: &'a BTreeMap<u64, usize>,
+    /// Places of the tables of rolled code, there.
+    pub tables: &'a [usize],
+    /// Place of the first constant vector, there.
+    pub vectors: usize,
     /// Signature and address of the function that computes sines and cosines.
     pub sines: (Signature, usize),
+}
+
+/// Numbers in a vector, in which like branches are computed together, where so many states are computed at once.
+pub fn width(precision: Precision, lanes: usize) -> usize {
+    match lanes {
+        1 => 16 / precision.bytes(),
+        _ => 1,
+    }
 }
 
 /// Place of each input array in the table of inputs.
@@ -61,8 +71,8 @@ pub fn input_places(inputs: &[InputArray]) -> Vec<usize> {
     inputs.iter().map(place).map(|place| place.expect("every input is an argument or a field")).collect()
 }
 
-/// Writes the body of a function.
-pub fn write(function: &mut Function, program: &OutputProgram<Code>, shape: &Shape) {
+/// Writes the body of a function. Returns the bits of the numbers of which the constant vectors consist that it reads.
+pub fn write(function: &mut Function, program: &OutputProgram<Code>, shape: &Shape) -> Vec<u64> {
     let mut context = FunctionBuilderContext::new();
     let mut b = FunctionBuilder::new(function, &mut context);
     let entry = b.create_block();
@@ -80,26 +90,32 @@ pub fn write(function: &mut Function, program: &OutputProgram<Code>, shape: &Sha
     let table = addresses(inputs_table, INPUTS);
     let outputs = (0..shape.results.len()).map(|place| addresses(results, place)).collect();
     let sines = b.import_signature(shape.sines.0.clone());
-    let number = match shape.precision {
-        Precision::F64 => types::F64,
-        Precision::F32 => types::F32,
-    };
-    let number = match shape.lanes {
-        1 => number,
-        lanes => number.by(lanes as u32).expect("there are vectors of 16 bytes"),
-    };
-    let mut writer = Writer { b, shape, number, inputs, outputs, memory, constants: table, sines };
+    let number = of_lanes(shape.precision, shape.lanes);
+    let mut writer = Writer { b, shape, number, inputs, outputs, memory, constants: table, vectors: Vec::new(), sines };
     lower::lower(&mut writer, program, shape.results, shape.spills);
     writer.b.ins().return_(&[]);
     writer.b.seal_all_blocks();
     writer.b.finalize();
+    writer.vectors
+}
+
+/// The type of so many numbers.
+fn of_lanes(precision: Precision, lanes: usize) -> Type {
+    let number = match precision {
+        Precision::F64 => types::F64,
+        Precision::F32 => types::F32,
+    };
+    match lanes {
+        1 => number,
+        lanes => number.by(lanes as u32).expect("there are vectors of 16 bytes"),
+    }
 }
 
 /// A body that is being written.
 struct Writer<'a> {
     b: FunctionBuilder<'a>,
     shape: &'a Shape<'a>,
-    /// Type of the numbers: a vector of them for several states, and while sines are written.
+    /// Type of the numbers: a vector of them for several states, for like branches, and while sines are written.
     number: Type,
     /// Addresses of the input arrays.
     inputs: Vec<Value>,
@@ -109,6 +125,8 @@ struct Writer<'a> {
     memory: Value,
     /// Address of the table of constants.
     constants: Value,
+    /// Bits of the numbers of constant vectors.
+    vectors: Vec<u64>,
     /// Signature of the function for sines and cosines.
     sines: SigRef,
 }
@@ -137,11 +155,12 @@ impl Writer<'_> {
         }
     }
 
-    /// What is known of loads and stores. Entries of several numbers are aligned as one of them is.
-    fn access(&self) -> MemFlags {
-        match self.shape.lanes {
-            1 => MemFlags::trusted(),
-            _ => MemFlags::new().with_notrap(),
+    /// What is known of loads and stores. Vectors are aligned where the function has its own numbers; in the arrays of
+    /// callers they are aligned as a number is.
+    fn access(&self, array: Array) -> MemFlags {
+        match array {
+            Array::Input(_) | Array::Result(_) if self.number.is_vector() => MemFlags::new().with_notrap(),
+            _ => MemFlags::trusted(),
         }
     }
 
@@ -151,7 +170,7 @@ impl Writer<'_> {
         let (address, first) = match place.array {
             Array::Input(k) => (self.inputs[k], 0),
             Array::Result(k) => (self.outputs[k], 0),
-            Array::Table(run) => (self.b.ins().iconst(self.shape.address, self.shape.tables[run] as i64), 0),
+            Array::Table(run) => (self.constants, self.shape.tables[run]),
             array => (self.memory, self.shape.memory.start(array)),
         };
         let address = match place.turn {
@@ -212,10 +231,7 @@ impl Writer<'_> {
             let mut angle = angles[0];
             if angles.len() > 1 {
                 self.number = vector;
-                angle = self.b.ins().splat(vector, angle);
-                for (lane, x) in angles.iter().enumerate().skip(1) {
-                    angle = self.b.ins().insertlane(angle, *x, lane as u8);
-                }
+                angle = self.vector(angles);
             }
             let limit = self.constant(limit(self.shape.precision));
             let size = self.b.ins().fabs(angle);
@@ -229,7 +245,7 @@ impl Writer<'_> {
             self.number = number;
             match angles.len() {
                 1 => pairs.push(pair),
-                n => pairs.extend((0..n).map(|lane| pair.map(|x| self.b.ins().extractlane(x, lane as u8)))),
+                _ => pairs.extend((0..angles.len()).map(|lane| pair.map(|x| self.part(&x, lane)))),
             }
         }
         (pairs, within)
@@ -237,25 +253,22 @@ impl Writer<'_> {
 
     /// Sines and cosines of numbers by the function that takes any angle.
     fn by_function(&mut self, angles: &[Value]) -> Vec<[Value; 2]> {
-        let lanes = self.shape.lanes;
+        let lanes = self.number.lane_count() as usize;
+        let padded = (angles.len() * lanes).next_multiple_of(BLOCK);
         let slots = [0; 3].map(|_| {
-            let slot = StackSlotData::new(StackSlotKind::ExplicitSlot, self.size() as u32 * BLOCK as u32, 4);
+            let slot = StackSlotData::new(StackSlotKind::ExplicitSlot, self.size() as u32 * padded as u32, 4);
             self.b.create_sized_stack_slot(slot)
         });
         let addresses = slots.map(|slot| self.b.ins().stack_addr(self.shape.address, slot, 0));
-        let mut pairs = Vec::new();
-        for angles in angles.chunks(BLOCK / lanes) {
-            let offset = |k: usize| (k * self.number.bytes() as usize) as i32;
-            let offsets: Vec<i32> = (0..BLOCK / lanes).map(offset).collect();
-            for (k, at) in offsets.iter().enumerate() {
-                let angle = angles.get(k).unwrap_or(&angles[0]);
-                self.b.ins().stack_store(*angle, slots[0], *at);
-            }
-            self.call_sines(addresses, angles.len() * lanes);
-            let part = |s: &mut Self, at, part: usize| s.b.ins().stack_load(s.number, slots[part], at);
-            pairs.extend(offsets.iter().take(angles.len()).map(|at| [1, 2].map(|which| part(self, *at, which))));
+        let bytes = self.number.bytes() as usize;
+        let offsets = (0..padded / lanes).map(move |k| (k * bytes) as i32);
+        for (k, at) in offsets.clone().enumerate() {
+            let angle = angles.get(k).unwrap_or(&angles[0]);
+            self.b.ins().stack_store(*angle, slots[0], at);
         }
-        pairs
+        self.call_sines(addresses, padded);
+        let part = |s: &mut Self, at, part: usize| s.b.ins().stack_load(s.number, slots[part], at);
+        offsets.take(angles.len()).map(|at| [1, 2].map(|which| part(self, at, which))).collect()
     }
 }
 
@@ -266,17 +279,20 @@ impl Instructions for Writer<'_> {
 
     fn constant(&mut self, x: f64) -> Value {
         // An operand in memory takes less code than a number in a register.
-        if let (false, Some(at)) = (self.number.is_vector(), self.shape.constants.get(&x.to_bits())) {
-            let offset = i32::try_from(self.size() * *at as i64).expect("constants are few");
+        let at = match self.number.is_vector() {
+            false => self.shape.constants.get(&x.to_bits()).copied(),
+            true => {
+                let known = self.vectors.iter().position(|bits| *bits == x.to_bits());
+                let k = known.unwrap_or(self.vectors.len());
+                if known.is_none() {
+                    self.vectors.push(x.to_bits());
+                }
+                Some(self.shape.vectors + k * self.number.lane_count() as usize)
+            }
+        };
+        if let Some(at) = at {
+            let offset = i32::try_from(self.size() * at as i64).expect("constants are few");
             return self.b.ins().load(self.number, MemFlags::trusted(), self.constants, offset);
-        }
-        if self.number.is_vector() {
-            let lanes = match self.shape.precision {
-                Precision::F32 => [(x as f32).to_le_bytes(); 4].concat(),
-                Precision::F64 => [x.to_le_bytes(); 2].concat(),
-            };
-            let lanes = self.b.func.dfg.constants.insert(lanes.into());
-            return self.b.ins().vconst(self.number, lanes);
         }
         match self.shape.precision {
             Precision::F32 => self.b.ins().f32const(x as f32),
@@ -286,8 +302,8 @@ impl Instructions for Writer<'_> {
 
     fn load(&mut self, place: Place<Value>) -> Value {
         // Not `readonly`: such loads would be merged, and their values kept in registers that others need.
-        let ((address, offset), access) = (self.address(place), self.access());
-        if let (Array::Table(_), true) = (place.array, self.number.is_vector()) {
+        let ((address, offset), access) = (self.address(place), self.access(place.array));
+        if let (Array::Table(_), true) = (place.array, self.shape.lanes > 1) {
             let one = self.b.ins().load(self.number.lane_type(), MemFlags::trusted(), address, offset);
             return self.b.ins().splat(self.number, one);
         }
@@ -295,7 +311,7 @@ impl Instructions for Writer<'_> {
     }
 
     fn store(&mut self, place: Place<Value>, value: Value) {
-        let ((address, offset), access) = (self.address(place), self.access());
+        let ((address, offset), access) = (self.address(place), self.access(place.array));
         self.b.ins().store(access, value, address, offset);
     }
 
@@ -327,7 +343,7 @@ impl Instructions for Writer<'_> {
     }
 
     fn sines(&mut self, angles: &[Value]) -> Vec<[Value; 2]> {
-        if angles.len() > MOST_INLINE {
+        if angles.len() * self.number.lane_count() as usize > MOST_INLINE * self.shape.lanes {
             return self.by_function(angles);
         }
         let (pairs, within) = self.by_main_path(angles);
@@ -352,6 +368,26 @@ impl Instructions for Writer<'_> {
             self.b.ins().iadd_imm(self.memory, offset)
         });
         self.call_sines(arrays, n * self.shape.lanes);
+    }
+
+    fn width(&self) -> usize {
+        width(self.shape.precision, self.shape.lanes)
+    }
+
+    fn vectors(&mut self, on: bool) {
+        self.number = of_lanes(self.shape.precision, if on { self.width() } else { self.shape.lanes });
+    }
+
+    fn vector(&mut self, numbers: &[Value]) -> Value {
+        let mut vector = self.b.ins().splat(self.number, numbers[0]);
+        for (lane, x) in numbers.iter().enumerate().skip(1).filter(|(_, x)| **x != numbers[0]) {
+            vector = self.b.ins().insertlane(vector, *x, lane as u8);
+        }
+        vector
+    }
+
+    fn part(&mut self, vector: &Value, k: usize) -> Value {
+        self.b.ins().extractlane(*vector, k as u8)
     }
 
     fn open_loop(&mut self, turns: usize, backward: bool, start: Vec<Value>) -> (Loop, Value, Vec<Value>) {

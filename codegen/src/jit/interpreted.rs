@@ -9,7 +9,8 @@ use super::{CompileError, Compiled};
 use crate::output::{Array, Output, Sizes, Spec};
 
 impl<S: Number> Compiled<S> {
-    /// As [`Compiled::evaluate`], but what is too large to compile is computed by the interpreter, which allocates.
+    /// As [`Compiled::evaluate`], but what is too large to compile is computed by the interpreter, which allocates; after
+    /// [`Compiled::interpreted`] everything that it has.
     ///
     /// # Errors
     /// Those of [`Compiled::evaluate`]; [`CompileError::TooLarge`] only for `parameter_derivatives`, and where the options
@@ -20,16 +21,21 @@ impl<S: Number> Compiled<S> {
         arguments: &[&[S]],
         results: &mut [&mut [S]],
     ) -> Result<(), CompileError> {
-        match self.evaluate(output, arguments, results) {
-            Err(error @ CompileError::TooLarge { .. }) => {
-                // Not seen by `evaluate`, which did not get that far.
-                self.check_arrays(output, arguments, results)?;
-                let all_frames = self.sizes().frames == self.plan().frames.len();
-                let possible = all_frames || !output.spec().of_frames();
-                let done = possible && interpret(self, output, arguments, results).is_some();
-                done.then_some(()).ok_or(error)
+        let available = Output::available(!self.plan().constraints.is_empty()).any(|other| other == output);
+        let chosen = self.interpreted && available;
+        if !chosen {
+            match self.evaluate(output, arguments, results) {
+                Err(CompileError::TooLarge { .. }) => {}
+                done => return done,
             }
-            done => done,
+        }
+        // Not seen by `evaluate`, which did not get that far.
+        self.check_arrays(output, arguments, results)?;
+        let all_frames = self.sizes().frames == self.plan().frames.len();
+        let possible = all_frames || !output.spec().of_frames();
+        match possible && interpret(self, output, arguments, results).is_some() {
+            true => Ok(()),
+            false => self.evaluate(output, arguments, results),
         }
     }
 

@@ -4,7 +4,7 @@
 //! - A function is called only through [`MachineCode::call`], which compares the length of every slice with that of the
 //!   array of which the code was made, times the number of states that it computes at once. The code reads and writes at
 //!   constant places inside these arrays, in tables that the function owns, and in working memory whose length is
-//!   compared too.
+//!   compared too. Tables and working memory begin at multiples of 16 bytes, as aligned loads and stores of vectors want.
 //! - Input slices are shared and result slices are exclusive references, so that the code's loads and stores do not
 //!   meet those of others.
 //! - The memory of the code lives as long as the function and is never changed after it was made, so that any number of
@@ -20,12 +20,13 @@ use cranelift::jit::{JITBuilder, JITModule};
 use cranelift::module::{default_libcall_names, Linkage, Module};
 use cranelift::prelude::*;
 
-use super::instructions::{input_places, write, Shape, BLOCK, INPUTS};
+use super::instructions::{input_places, width, write, Shape, BLOCK, INPUTS};
 use super::CompileError;
 use crate::code::Code;
-use crate::lower::{Memory, Spills};
+use crate::lower::{is_together, table, Memory, Spills};
 use crate::options::{Arithmetic, Precision};
 use crate::output::OutputProgram;
+use crate::rolled::RolledProgram;
 use mbd_runtime::kernel::{level, Level};
 use mbd_runtime::system::Real;
 use mbd_runtime::trig;
@@ -111,13 +112,18 @@ pub struct MachineCode<S> {
     scratch: usize,
     /// Length of the code, bytes.
     size: usize,
-    /// Constants that the code reads.
+    /// Constants and tables that the code reads, from the first address on that vectors may have.
     constants: Box<[S]>,
-    /// Tables of rolled code, at addresses that are part of the code.
-    _tables: Vec<Box<[S]>>,
 }
 
-// SAFETY: the module and the tables are not touched before they are dropped, and the code has no state of its own.
+/// Entries before the first address that vectors may have.
+#[inline]
+fn before_aligned<S>(at: *const S) -> usize {
+    // Numbers are aligned to their own size, which divides that of a vector.
+    (at as usize).wrapping_neg() % 16 / size_of::<S>()
+}
+
+// SAFETY: the module is not touched before it is dropped, and the code has no state of its own.
 unsafe impl<S> Send for MachineCode<S> {}
 // SAFETY: the same.
 unsafe impl<S> Sync for MachineCode<S> {}
@@ -142,14 +148,24 @@ impl<S: Number> MachineCode<S> {
             signature.params = vec![AbiParam::new(address); parameters];
             signature
         };
-        let tables: Vec<Box<[S]>> = match &program.program {
-            Code::Straight(_) => Vec::new(),
-            Code::Rolled(rolled) => rolled.loops.iter().map(|run| run.table.concat()).map(numbers).collect(),
-        };
         let constants: BTreeMap<u64, usize> =
             program.program.constants().into_iter().enumerate().map(|(at, bits)| (bits, at)).collect();
-        let spills = Spills::of(&program.program, REGISTERS);
-        let memory = Memory::new(&program.program, &spills, BLOCK);
+        let width = width(S::PRECISION, lanes);
+        let mut numbers: Vec<f64> = constants.keys().map(|bits| f64::from_bits(*bits)).collect();
+        let mut tables = Vec::new();
+        let lanes_of_vector = 16 / S::PRECISION.bytes();
+        let align = |numbers: &mut Vec<f64>| numbers.resize(numbers.len().next_multiple_of(lanes_of_vector), 0.0);
+        align(&mut numbers);
+        if let Code::Rolled(rolled) = &program.program {
+            let together = is_together(rolled, width).then_some(width);
+            for run in &rolled.loops {
+                tables.push(numbers.len());
+                numbers.extend(table(run, together));
+            }
+        }
+        align(&mut numbers);
+        let spills = Spills::of(&program.program, REGISTERS, width);
+        let memory = Memory::new(&program.program, &spills, BLOCK, width);
         let shape = Shape {
             precision: S::PRECISION,
             lanes,
@@ -159,13 +175,20 @@ impl<S: Number> MachineCode<S> {
             memory: &memory,
             spills: &spills,
             constants: &constants,
-            tables: &tables.iter().map(|table| table.as_ptr() as usize).collect::<Vec<_>>(),
+            tables: &tables,
+            vectors: numbers.len(),
             sines: (signature(4), S::SINES[usize::from(fast)] as usize),
         };
         let id = module.declare_function(program.spec.name, Linkage::Local, &signature(3));
         let id = id.map_err(CompileError::machine)?;
         let mut function = Function::with_name_signature(UserFuncName::user(0, id.as_u32()), signature(3));
-        write(&mut function, program, &shape);
+        let vectors = write(&mut function, program, &shape);
+        numbers.extend(vectors.iter().flat_map(|bits| vec![f64::from_bits(*bits); lanes_of_vector]));
+        let mut constants = vec![S::zero(); lanes_of_vector + numbers.len()].into_boxed_slice();
+        let first = before_aligned(constants.as_ptr());
+        for (to, from) in constants[first..].iter_mut().zip(numbers) {
+            *to = S::constant(from);
+        }
         let mut context = Context::for_function(function);
         module.define_function(id, &mut context).map_err(CompileError::machine)?;
         let size = context.compiled_code().map_or(0, |code| code.code_info().total_size as usize);
@@ -185,10 +208,9 @@ impl<S: Number> MachineCode<S> {
             entry,
             inputs,
             results,
-            scratch: lanes * memory.len(),
+            scratch: lanes * memory.len() + lanes_of_vector,
             size,
-            constants: numbers(constants.into_keys().map(f64::from_bits).collect()),
-            _tables: tables,
+            constants,
         })
     }
 
@@ -225,10 +247,14 @@ impl<S: Number> MachineCode<S> {
             assert!(result.len() == *len, "a result has {} entries, expected {len}", result.len());
             *to = result.as_mut_ptr();
         }
-        let mut read = [self.constants.as_ptr(); INPUTS + 1];
+        let constants = &self.constants[before_aligned(self.constants.as_ptr())..];
+        let mut read = [constants.as_ptr(); INPUTS + 1];
         for (to, input) in read.iter_mut().zip(inputs) {
             *to = input.as_ptr();
         }
+        // The length of the working memory includes what is skipped.
+        let skipped = before_aligned(scratch.as_ptr());
+        let scratch = &mut scratch[skipped..];
         // SAFETY: see the head of this file.
         unsafe { (self.entry)(read.as_ptr(), written.as_ptr(), scratch.as_mut_ptr()) }
     }
@@ -238,17 +264,14 @@ impl<S: Number> MachineCode<S> {
 fn compiler(code: &Code) -> Result<JITModule, CompileError> {
     let mut flags = settings::builder();
     // Straight-line code is optimised already, and its order decides what stays in registers.
-    let optimisation = if matches!(code, Code::Straight(_)) { "none" } else { "speed" };
+    let loops = |program: &RolledProgram| program.loops.iter().any(|run| run.branches.is_empty());
+    let optimisation = if matches!(code, Code::Rolled(program) if loops(program)) { "speed" } else { "none" };
     for (name, value) in [("opt_level", optimisation), ("enable_verifier", "false"), ("is_pic", "false")] {
         flags.set(name, value).map_err(CompileError::machine)?;
     }
     let isa = cranelift::native::builder().map_err(CompileError::machine)?;
     let isa = isa.finish(settings::Flags::new(flags)).map_err(CompileError::machine)?;
     Ok(JITModule::new(JITBuilder::with_isa(isa, default_libcall_names())))
-}
-
-fn numbers<S: Number>(table: Vec<f64>) -> Box<[S]> {
-    table.into_iter().map(S::constant).collect()
 }
 
 impl<S> Drop for MachineCode<S> {

@@ -24,6 +24,7 @@
 mod compiled;
 mod drives;
 mod error;
+mod functions;
 mod instructions;
 mod interpreted;
 mod lanes;

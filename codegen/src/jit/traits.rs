@@ -52,17 +52,13 @@ impl<S: Number> Energetic for Compiled<S> {
 
 impl<S: Number> Conjugate for Compiled<S> {
     fn conjugate_momenta(&mut self, q: &Vec<S>, v: &Vec<S>, p: &mut Vec<S>) {
-        if !self.run(Output::Momenta, [q, v, &[]], &mut [p]) {
-            self.interpreter.conjugate_momenta(q, v, p);
-        }
+        self.momenta(q, v, p);
     }
 }
 
 impl<S: Number> Accelerated for Compiled<S> {
     fn generalized_accelerations(&mut self, q: &Vec<S>, v: &Vec<S>, a: &mut Vec<S>) {
-        if !self.run(Output::Accelerations, [q, v, &[]], &mut [a]) {
-            self.interpreter.generalized_accelerations(q, v, a);
-        }
+        self.accelerations(q, v, a);
     }
 }
 

@@ -11,11 +11,14 @@ mod registers;
 mod rolled;
 mod sines;
 mod straight;
+mod together;
 
 use crate::code::Code;
 use crate::output::OutputProgram;
 use crate::symbolic::Label;
 
+#[cfg(feature = "jit")]
+pub use memory::{is_together, table};
 pub use memory::{Memory, Spills};
 #[cfg(feature = "jit")]
 pub use sines::main_path;
@@ -139,6 +142,25 @@ pub trait Instructions {
     /// The same for the first `n` entries of [`Array::Angles`], into [`Array::Sines`] and [`Array::Cosines`].
     fn sines_of_array(&mut self, n: usize);
 
+    /// Numbers in a vector, in which like branches are computed together. Where it is 1, they are computed one after the
+    /// other.
+    fn width(&self) -> usize {
+        1
+    }
+
+    /// Whether values are vectors from here on, or single numbers as in the beginning.
+    fn vectors(&mut self, _on: bool) {}
+
+    /// A vector of single numbers; one number stands for all.
+    fn vector(&mut self, numbers: &[Self::Value]) -> Self::Value {
+        numbers[0].clone()
+    }
+
+    /// A single number of a vector.
+    fn part(&mut self, vector: &Self::Value, _k: usize) -> Self::Value {
+        vector.clone()
+    }
+
     /// Begins a loop of `turns` turns, from the last to the first if `backward`. Returns the number of the turn and the
     /// values that are carried from turn to turn, which are `start` in the first one.
     fn open_loop(
@@ -160,8 +182,8 @@ pub trait Instructions {
 }
 
 /// Tells a target the body of a function, whose results fill arrays of the lengths `results`. Targets whose compiler
-/// decides by itself what stays in registers have no `spills`.
-pub fn lower<I: Instructions>(target: &mut I, program: &OutputProgram<Code>, results: &[usize], spills: &Spills) {
+/// decides by itself what stays in registers have no `spills`, others one for each block.
+pub fn lower<I: Instructions>(target: &mut I, program: &OutputProgram<Code>, results: &[usize], spills: &[Spills]) {
     let entries = |lengths: Vec<usize>, array: fn(usize) -> Array| {
         let of = move |(k, len)| (0..len).map(move |at| (array(k), at));
         lengths.into_iter().enumerate().flat_map(of).collect::<Vec<_>>()

@@ -7,19 +7,33 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::memory::Home;
+use super::memory::{is_together, Home};
 use super::Spills;
 use crate::code::Code;
+use crate::rolled::Block;
 use crate::symbolic::angles::{nodes, Angles};
 use crate::symbolic::{Op, Program};
 
 impl Spills {
-    /// Those of some code; loops are short and keep their values.
-    pub fn of(code: &Code, registers: usize) -> Spills {
-        match code {
-            Code::Straight(program) => Spills::new(program, &Angles::new(program), registers),
-            Code::Rolled(_) => Spills { decided: true, ..Spills::default() },
+    /// Those of each block of some code, for a target with vectors of `width` numbers; loops over links are short and
+    /// keep their values.
+    pub fn of(code: &Code, registers: usize, width: usize) -> Vec<Spills> {
+        let new = |program: &Program| Spills::new(program, &Angles::new(program), registers);
+        let program = match code {
+            Code::Straight(program) => return vec![new(program)],
+            Code::Rolled(program) => program,
+        };
+        if !is_together(program, width) {
+            return program.blocks.iter().map(|_| Spills { decided: true, ..Spills::NONE }).collect();
         }
+        let mut first = 0;
+        let of_block = |block: &Block| {
+            let width = if block.repeat.is_some() { width } else { 1 };
+            let spills = Spills { first: usize::next_multiple_of(first, width), width, ..new(&block.program) };
+            first = spills.entry(spills.places);
+            spills
+        };
+        program.blocks.iter().map(of_block).collect()
     }
 
     /// Decides for a body that computes `angles.before`, then sines and cosines, then the rest, with so many registers.
@@ -39,7 +53,7 @@ impl Spills {
                 uses.entry(id).or_default().push(k);
             }
         }
-        let mut spills = Spills { decided: true, ..Spills::default() };
+        let mut spills = Spills { decided: true, ..Spills::NONE };
         let mut memory: BTreeSet<u32> = early.clone();
         // Values in registers.
         let mut held: BTreeSet<u32> = BTreeSet::new();

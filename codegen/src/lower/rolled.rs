@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::memory::is_together;
 use super::straight::{Lowering, Values};
 use super::{Array, Instructions, Place};
 use crate::rolled::{Place as Source, Repeat, RolledProgram, Start, SweepDirection, Target};
@@ -9,7 +10,7 @@ use crate::symbolic::angles::pairs;
 use crate::symbolic::ProgramResult;
 
 /// One turn of a loop.
-struct Turn<'a, I: Instructions> {
+pub struct Turn<'a, I: Instructions> {
     /// Its number.
     k: I::Turn,
     run: usize,
@@ -26,6 +27,9 @@ impl<I: Instructions> Turn<'_, I> {
 
 impl<I: Instructions> Lowering<'_, I> {
     pub fn rolled(&mut self, program: &RolledProgram) {
+        if is_together(program, self.target.width()) {
+            return self.together(program);
+        }
         for (number, block) in program.blocks.iter().enumerate() {
             match &block.repeat {
                 None => {
@@ -38,7 +42,7 @@ impl<I: Instructions> Lowering<'_, I> {
     }
 
     /// An input of a block.
-    fn source(&mut self, program: &RolledProgram, source: Source, turn: Option<&Turn<I>>) -> I::Value {
+    pub fn source(&mut self, program: &RolledProgram, source: Source, turn: Option<&Turn<I>>) -> I::Value {
         let place = match (source, turn) {
             (Source::Given(k), _) => {
                 let (array, at) = self.inputs[k];
@@ -64,7 +68,7 @@ impl<I: Instructions> Lowering<'_, I> {
     }
 
     /// Gives a value to an output of a block; those that are carried to the next turn are the caller's.
-    fn give(&mut self, program: &RolledProgram, target: Target, turn: Option<&Turn<I>>, value: I::Value) {
+    pub fn give(&mut self, program: &RolledProgram, target: Target, turn: Option<&Turn<I>>, value: I::Value) {
         let place = match (target, turn) {
             (Target::Result(k), _) => {
                 let (array, at) = self.results[k];
@@ -100,20 +104,7 @@ impl<I: Instructions> Lowering<'_, I> {
     }
 
     fn repeated(&mut self, program: &RolledProgram, number: usize, repeat: &Repeat) {
-        let mut start = Vec::new();
-        for (value, _) in &repeat.carried {
-            start.push(match *value {
-                Start::Const(x) => self.target.constant(x),
-                Start::Kept(slot, minus) => {
-                    let value = self.source(program, Source::Kept(slot), None);
-                    self.signed(value, minus)
-                }
-                Start::Given(k, minus) => {
-                    let value = self.source(program, Source::Given(k), None);
-                    self.signed(value, minus)
-                }
-            });
-        }
+        let start = repeat.carried.iter().map(|(start, _)| self.start(program, *start)).collect();
         let (turns, backward) = (program.loops[repeat.run].table.len(), repeat.way == Some(SweepDirection::TipToBase));
         let (open, k, carried) = self.target.open_loop(turns, backward, start);
         let next = self.block(program, number, Some(&Turn { k, run: repeat.run, carried: &carried }));
@@ -124,6 +115,17 @@ impl<I: Instructions> Lowering<'_, I> {
                 self.target.store(Place::fixed(Array::Kept, at), value);
             }
         }
+    }
+
+    /// First value of something carried.
+    pub fn start(&mut self, program: &RolledProgram, start: Start) -> I::Value {
+        let (source, minus) = match start {
+            Start::Const(x) => return self.target.constant(x),
+            Start::Kept(slot, minus) => (Source::Kept(slot), minus),
+            Start::Given(k, minus) => (Source::Given(k), minus),
+        };
+        let value = self.source(program, source, None);
+        self.signed(value, minus)
     }
 
     /// Sines and cosines of all turns together.

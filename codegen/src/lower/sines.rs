@@ -95,10 +95,20 @@ impl Recording {
 
     /// Tells a target the instructions. Returns the values of inputs and instructions.
     fn tell<I: Instructions>(self, target: &mut I, inputs: Vec<I::Value>) -> Vec<I::Value> {
+        // The last instruction that uses each number.
+        let mut last = vec![0; self.inputs + self.steps.len()];
+        for (k, step) in self.steps.iter().enumerate() {
+            let _ = step.as_ref().map(|operation| operation.clone().map(|id| last[id] = k));
+        }
         let mut values = inputs;
-        for step in self.steps {
+        for (k, step) in self.steps.into_iter().enumerate() {
             let value = match step {
                 Err(x) => target.constant(x),
+                // Some processors write the result where the first operand was.
+                Ok(Operation::Fma(a, b, c)) => {
+                    let (a, b) = if last[a] > k && last[b] == k { (b, a) } else { (a, b) };
+                    target.operation(Operation::Fma(a, b, c).map(|id| values[id].clone()))
+                }
                 Ok(operation) => target.operation(operation.map(|id| values[id].clone())),
             };
             values.push(value);

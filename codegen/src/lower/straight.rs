@@ -14,8 +14,8 @@ pub(super) struct Lowering<'a, I: Instructions> {
     pub inputs: Vec<(Array, usize)>,
     /// Array and entry of each result.
     pub results: Vec<(Array, usize)>,
-    /// Values of straight-line code that leave the registers.
-    pub spills: &'a Spills,
+    /// Values that leave the registers, for each block; those of blocks that are left out are [`Spills::NONE`].
+    pub spills: &'a [Spills],
 }
 
 /// Values of the nodes of a block's program, and the sines and cosines by their angles, as far as they are known.
@@ -35,7 +35,12 @@ impl<V: Clone> Values<V> {
     }
 }
 
-impl<I: Instructions> Lowering<'_, I> {
+impl<'a, I: Instructions> Lowering<'a, I> {
+    /// Values of a block that leave the registers.
+    fn spills_of(&self, block: usize) -> &'a Spills {
+        self.spills.get(block).unwrap_or(const { &Spills::NONE })
+    }
+
     pub fn signed(&mut self, x: I::Value, minus: bool) -> I::Value {
         if minus {
             self.target.operation(Operation::Negate(x))
@@ -47,10 +52,11 @@ impl<I: Instructions> Lowering<'_, I> {
     /// The value of an operation other than inputs, sines and cosines.
     fn operation(&mut self, id: u32, op: &Op, values: &Values<I::Value>) -> I::Value {
         // Some processors write the result where the first operand was, and read the last one from memory.
-        let gone = |o: Operand| matches!(o, Operand::Node(k) if self.spills.last.contains(&(id, k)));
+        let spills = self.spills_of(values.block);
+        let gone = |o: Operand| matches!(o, Operand::Node(k) if spills.last.contains(&(id, k)));
         let loaded = |o: Operand| match o {
-            Operand::Const(_) => self.spills.decided,
-            Operand::Node(k) => gone(o) && self.spills.loaded.get(&id).is_some_and(|all| all.contains(&k)),
+            Operand::Const(_) => spills.decided,
+            Operand::Node(k) => gone(o) && spills.loaded.get(&id).is_some_and(|all| all.contains(&k)),
         };
         let last = |a: Operand, b: Operand| if loaded(a) && !loaded(b) { (b, a) } else { (a, b) };
         let mut operand = |o: Operand| match o {
@@ -96,6 +102,7 @@ impl<I: Instructions> Lowering<'_, I> {
         mut input: impl FnMut(&mut Self, usize) -> I::Value,
         mut put: impl FnMut(&mut Self, usize, I::Value),
     ) {
+        let spills = self.spills_of(values.block);
         let mut results: BTreeMap<u32, Vec<(usize, bool)>> = BTreeMap::new();
         for (k, result) in program.outputs.iter().enumerate() {
             if let ProgramResult::Node(id, minus) = result {
@@ -107,10 +114,10 @@ impl<I: Instructions> Lowering<'_, I> {
                 continue;
             }
             if values.of[*id as usize].is_none() {
-                for value in self.spills.loaded.get(id).into_iter().flatten() {
-                    let again = match self.spills.homes[value] {
+                for value in spills.loaded.get(id).into_iter().flatten() {
+                    let again = match spills.homes[value] {
                         Home::Input(k) => input(self, k),
-                        Home::Stored(at) => self.target.load(Place::fixed(Array::Spilled, at)),
+                        Home::Stored(at) => self.target.load(Place::fixed(Array::Spilled, spills.entry(at))),
                     };
                     values.of[*value as usize] = Some(again);
                 }
@@ -137,8 +144,9 @@ impl<I: Instructions> Lowering<'_, I> {
     /// Sets the value of a node, and stores it if it leaves the registers.
     fn define(&mut self, values: &mut Values<I::Value>, id: u32, label: Label, value: I::Value) {
         let value = self.target.named(values.block, id, label, value);
-        if let Some(Home::Stored(at)) = self.spills.homes.get(&id) {
-            self.target.store(Place::fixed(Array::Spilled, *at), value.clone());
+        let spills = self.spills_of(values.block);
+        if let Some(Home::Stored(at)) = spills.homes.get(&id) {
+            self.target.store(Place::fixed(Array::Spilled, spills.entry(*at)), value.clone());
         }
         values.of[id as usize] = Some(value);
     }
@@ -154,8 +162,6 @@ impl<I: Instructions> Lowering<'_, I> {
     }
 
     pub fn straight(&mut self, program: &Program) {
-        let angles = Angles::new(program);
-        let mut values = Values::new(0, program);
         let input = |s: &mut Self, k: usize| {
             let (array, at) = s.inputs[k];
             s.target.load(Place::fixed(array, at))
@@ -164,6 +170,19 @@ impl<I: Instructions> Lowering<'_, I> {
             let (array, at) = s.results[k];
             s.target.store(Place::fixed(array, at), value);
         };
+        self.body(0, program, input, put);
+    }
+
+    /// A straight-line block: its angles' sines and cosines, then the rest.
+    pub fn body(
+        &mut self,
+        block: usize,
+        program: &Program,
+        input: impl Fn(&mut Self, usize) -> I::Value + Copy,
+        put: impl Fn(&mut Self, usize, I::Value) + Copy,
+    ) {
+        let angles = Angles::new(program);
+        let mut values = Values::new(block, program);
         if !angles.early.is_empty() {
             self.steps(program, &mut values, |id| angles.before.contains(&id), input, |_, _, _| {});
             let early: Vec<I::Value> = angles.early.keys().map(|angle| values.get(*angle)).collect();

@@ -56,6 +56,18 @@ pub enum Vectors {
 }
 
 impl Together {
+    /// Whether it is to replace straight-line code for one state, on a target that has vectors of `width` numbers and
+    /// writes the code of as many of them as there are branches.
+    pub fn pays_in(&self, width: usize, straight: &Program, options: &Options) -> bool {
+        let blocks = self.program.blocks.iter().map(|block| {
+            let turns = |repeat: &super::Repeat| self.program.loops[repeat.run].table.len().div_ceil(width);
+            block.repeat.as_ref().map_or(1, turns) * block.program.instructions()
+        });
+        let (together, apart) = (blocks.sum::<usize>(), straight.instructions());
+        let fewer = apart >= LEAST && together as f64 <= WORTH * apart as f64;
+        options.plan.branches == LikeBranches::Together || fewer
+    }
+
     /// Where it is to replace straight-line code for one state, if anywhere. Exact code is the same on all targets, and
     /// made for the smallest registers.
     pub fn pays(&self, straight: &Program, options: &Options) -> Option<Vectors> {

@@ -5,7 +5,7 @@ use super::sines;
 use crate::code::Code;
 use crate::emit::fields::fields;
 use crate::emit::Input;
-use crate::lower::{Memory, Spills};
+use crate::lower::Memory;
 use crate::output::OutputProgram;
 
 /// Arrays start at multiples of this, bytes: a vector.
@@ -75,11 +75,8 @@ impl Layout {
             });
             let results = results.collect();
             // Angles fill vectors.
-            let memory = Memory::new(
-                &program.program,
-                &Spills::default(),
-                Number::vector(number.precision()).lanes() / number.lanes(),
-            );
+            let memory =
+                Memory::new(&program.program, &[], Number::vector(number.precision()).lanes() / number.lanes(), 1);
             layout.functions.push(FunctionAreas { results, tables: Vec::new(), memory });
         }
         let work = layout.functions.iter().map(|function| function.memory.len()).max().unwrap_or(0);

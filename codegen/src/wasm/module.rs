@@ -11,7 +11,7 @@ use super::layout::{Layout, PAGE};
 use super::number::Number;
 use super::sines;
 use crate::code::Code;
-use crate::lower::{lower, Spills};
+use crate::lower::lower;
 use crate::output::OutputProgram;
 
 /// Name of the exported memory.
@@ -92,6 +92,6 @@ fn body(layout: &Layout, k: usize, program: &OutputProgram<Code>, functions: Sin
     let (body, _) = Body::new(&[]);
     let mut writer = Writer::new(body, layout.number, &addresses, functions);
     let lengths: Vec<usize> = areas.results.iter().map(|area| area.len() / layout.number.lanes()).collect();
-    lower(&mut writer, program, &lengths, &Spills::default());
+    lower(&mut writer, program, &lengths, &[]);
     (writer.body.finish(&[]), writer.calls_sines)
 }

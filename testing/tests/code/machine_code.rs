@@ -17,8 +17,10 @@ use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::{random_state, State};
 use mbd_testing::toml::to_toml;
 
+use crate::fuzzed;
+
 /// Machine code of a plan with the inputs of a state.
-fn compiled<S: Number>(plan: &Plan, options: &Options, s: &State) -> Compiled<S> {
+pub fn compiled<S: Number>(plan: &Plan, options: &Options, s: &State) -> Compiled<S> {
     let mut compiled = Compiled::from_plan(plan.clone(), options.clone()).expect("options");
     *compiled.inputs() = s.interpreter_of(plan, |x, _| S::constant(x));
     // Keeps the other inputs.
@@ -128,41 +130,46 @@ fn compare_traits(whose: &str, plan: &Plan, s: &State) {
     check("multipliers", &r, &r2);
 }
 
-/// Rates of a random mechanism, every fifth with loops.
-fn compare_rates(seed: u64) {
-    let loops = seed.is_multiple_of(5);
-    let (model, state) = match loops {
-        true => {
-            let system = random_loops(seed, &LoopKnobs::everything(seed, 4));
-            (system.model, Some(system.state))
-        }
-        false => (random_model(seed, &Distribution::everything(seed, 5)), None),
-    };
-    let options = exact(EliminationStrategy::Single, RolledCode::Auto);
-    let plan = search::plan(&model, PlanOptions::quick());
-    let s = state.unwrap_or_else(|| random_state(&plan, seed));
-    let (mut c, mut i) = (compiled::<f64>(&plan, &options, &s), s.interpreter(&plan));
-    let p: Vec<f64> = s.v.iter().map(|x| 0.7 * x - 0.1).collect();
-    let mut rates = [0; 2].map(|_| (zeros(plan.dims.nq), zeros(plan.dims.nv)));
-    c.rates_at(0.0, &s.q, &p, &mut rates[0].0, &mut rates[0].1);
-    i.rates_at(0.0, &s.q, &p, &mut rates[1].0, &mut rates[1].1);
-    let [found, expected] = rates.map(|(qd, pd)| [qd, pd].concat());
-    mbd_testing::assert_same_bits(&format!("seed {seed}"), "rates", &plan.model, &found, &expected);
-}
-
 #[test]
-fn rates_of_many_models() {
-    (1000..1200).for_each(compare_rates);
-}
-
-#[test]
-#[ignore = "minutes: 10^5 models"]
-fn rates_of_a_hundred_thousand_models() {
-    std::thread::scope(|scope| {
-        for thread in 0..2 {
-            scope.spawn(move || (0..50_000).for_each(|k| compare_rates(10_000 + 2 * k + thread)));
-        }
+fn many_models() {
+    (1000..1150).for_each(|seed| {
+        fuzzed::compare(seed);
     });
+}
+
+/// The interpreter in place of machine code that is not to be had, by every output of a tree and of loops.
+#[test]
+fn outputs_without_machine_code_are_interpreted() {
+    let closed = random_loops(3, &LoopKnobs::plain());
+    let open = random_model(3, &Distribution { bodies: (4, 4), ..Distribution::default() });
+    let open = search::plan(&open, PlanOptions::quick());
+    let closed = (search::plan(&closed.model, PlanOptions::quick()), closed.state);
+    for (plan, s) in [(open.clone(), random_state(&open, 3)), closed] {
+        let options = exact(EliminationStrategy::Single, RolledCode::Auto);
+        let mut c = compiled::<f64>(&plan, &options, &s);
+        let mut without = c.clone().interpreted();
+        let constrained = !plan.constraints.is_empty();
+        for output in Output::available(constrained) {
+            let inputs = s.inputs(&s.v, &s.v);
+            let arguments: Vec<&[f64]> = output.spec().inputs.iter().map(|array| inputs[array.name]).collect();
+            let lengths: Vec<usize> = output.spec().results.iter().map(|r| r.len(c.sizes())).collect();
+            let results = || lengths.iter().map(|len| zeros(*len)).collect::<Vec<_>>();
+            let (mut by_code, mut by_interpreter, mut wrong) = (results(), results(), zeros(lengths[0] + 1));
+            let mut to: Vec<&mut [f64]> = by_code.iter_mut().map(Vec::as_mut_slice).collect();
+            match c.evaluate(output, &arguments, &mut to) {
+                Err(CompileError::TooLarge { .. }) => continue,
+                done => done.expect("machine code"),
+            }
+            let mut to: Vec<&mut [f64]> = by_interpreter.iter_mut().map(Vec::as_mut_slice).collect();
+            without.evaluate_or_interpret(output, &arguments, &mut to).expect("the interpreter");
+            let (found, expected) = (by_interpreter.concat(), by_code.concat());
+            mbd_testing::assert_same_bits("without machine code", output.name(), &plan.model, &found, &expected);
+            let error = without.evaluate_or_interpret(output, &arguments, &mut [&mut wrong]);
+            assert!(matches!(error, Err(CompileError::Arrays { .. })), "{output:?}: {error:?}");
+        }
+        let rows = without.evaluate_or_interpret(Output::Multipliers, &[&s.q, &s.v], &mut [&mut zeros(plan.dims.rows)]);
+        assert_eq!(rows.is_ok(), constrained, "multipliers without constraints: {rows:?}");
+    }
 }
 
 fn zeros(n: usize) -> Vec<f64> {

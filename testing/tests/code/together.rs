@@ -1,92 +1,23 @@
 //! Like branches of one node that are computed together, against the interpreter.
 //!
 //! In exact arithmetic the operations are those of the sweeps, and what branches hand to their parent is added in the
-//! order of the interpreter: results are the same bit for bit. In fast arithmetic the errors are small, and code that
-//! computes one branch after the other (for several states) has the bits of code that computes all at once.
+//! order of the interpreter: results are the same bit for bit, those of machine code made at run time too. In fast
+//! arithmetic the errors are small, and code that computes one branch after the other (for several states) has the bits
+//! of code that computes all at once.
 
-use std::fmt::Write;
-
-use mbd_codegen::generate::trace;
+use mbd_codegen::generate::{trace, InputArray};
+use mbd_codegen::jit::Number;
 use mbd_codegen::model::Model;
 use mbd_codegen::options::{EliminationStrategy, LikeBranches, PlanOptions};
 use mbd_codegen::plan::Plan;
-use mbd_codegen::read::{self, Base, ImportOptions};
+use mbd_codegen::read::Base;
 use mbd_codegen::rolled::{together, Vectors};
-use mbd_codegen::{search, Arithmetic, Options, Output};
+use mbd_codegen::{search, Arithmetic, Options, Output, Precision};
 use mbd_testing::assert_same_bits;
-use mbd_testing::random::Rng;
-use mbd_testing::state::random_state;
+use mbd_testing::branches::{tree, NUMBERS};
+use mbd_testing::state::{random_state, State};
 
-use crate::wide;
-
-/// How the numbers of the branches of a body differ.
-#[derive(Clone, Copy, Debug)]
-enum Numbers {
-    Same,
-    /// The second is the mirror image of the first, and so on.
-    Mirrored,
-    Different,
-    /// Some of one branch's are zero.
-    ZerosInOne,
-}
-
-const NUMBERS: [Numbers; 4] = [Numbers::Same, Numbers::Mirrored, Numbers::Different, Numbers::ZerosInOne];
-
-const KINDS: [&str; 4] = ["revolute", "prismatic", "spherical", "universal"];
-
-/// One body with its joint.
-fn body(text: &mut String, name: &str, parent: &str, kind: &str, rng: &mut Rng, scale: [f64; 3]) {
-    let mut vector = |size: f64| scale.map(|s| s * (size + rng.around(0.5 * size)));
-    let (xyz, com) = (vector(0.3), vector(0.1));
-    let mass = 1.0 + 0.5 * scale[1].abs();
-    let axis = match kind {
-        "revolute" | "prismatic" => "axis = [0, 1, 0]\n".to_string(),
-        _ => String::new(),
-    };
-    let _ = writeln!(
-        text,
-        "[[body]]\nname = \"{name}\"\nmass = {mass}\ncom = {com:?}\ninertia = [0.02, 0.03, 0.04]\n\n[[joint]]\nname = \
-         \"j_{name}\"\ntype = \"{kind}\"\nparent = \"{parent}\"\nchild = \"{name}\"\nxyz = {xyz:?}\n{axis}"
-    );
-}
-
-/// A floating body with two to six like branches, a branch that is like none, and branches on branches.
-fn tree(seed: u64, numbers: Numbers) -> Model {
-    let mut rng = Rng::new(seed, 3);
-    let mut text =
-        "name = \"tree\"\ngravity = [0, 0, -9.81]\n\n[[body]]\nname = \"trunk\"\nmass = 5.0\ncom = [0.1, 0, \
-                    0.02]\ninertia = [0.2, 0.3, 0.4]\n\n[[joint]]\nname = \"base\"\ntype = \"floating\"\nchild = \
-                    \"trunk\"\n\n"
-            .to_string();
-    let (branches, length) = (2 + rng.below(5), 1 + rng.below(4));
-    let kinds: Vec<&str> = (0..length).map(|_| if rng.chance(0.7) { "revolute" } else { rng.pick(&KINDS) }).collect();
-    let fingers = rng.chance(0.3);
-    for branch in 0..branches {
-        let mut own = match numbers {
-            Numbers::Different => Rng::new(seed, 20 + branch as u64),
-            _ => Rng::new(seed, 20),
-        };
-        let scale = match numbers {
-            Numbers::Mirrored if branch % 2 == 1 => [1.0, -1.0, 1.0],
-            Numbers::ZerosInOne if branch == 1 => [1.0, 0.0, 1.0],
-            Numbers::Same | Numbers::Mirrored | Numbers::Different | Numbers::ZerosInOne => [1.0; 3],
-        };
-        let mut parent = "trunk".to_string();
-        for (k, kind) in kinds.iter().enumerate() {
-            let name = format!("b{branch}_{k}");
-            body(&mut text, &name, &parent, kind, &mut own, scale);
-            parent = name;
-        }
-        for finger in 0..if fingers { 2 } else { 0 } {
-            body(&mut text, &format!("f{branch}_{finger}"), &parent, "revolute", &mut own, scale);
-        }
-        if branch == 1 {
-            body(&mut text, "odd", "trunk", "prismatic", &mut rng, [1.0; 3]);
-        }
-    }
-    let options = ImportOptions::default();
-    read::model("tree.toml", &text, &options).unwrap_or_else(|findings| panic!("{findings}\n{text}")).model
-}
+use crate::{machine_code, wide};
 
 fn options(arithmetic: Arithmetic, elimination: EliminationStrategy) -> Options {
     let branches = LikeBranches::Together;
@@ -145,6 +76,26 @@ fn compare(what: &str, model: &Model, plan: &Plan, options: &Options) -> usize {
             let off = results.iter().zip(&expected).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
             assert!(off <= 1e-11 * size, "{what}: {output:?} is {off:e} off, size {size:e}");
         }
+        let doubles = by_machine_code::<f64>(plan, options, &s, output, &both.inputs, &given);
+        let singles = by_machine_code::<f32>(plan, options, &s, output, &both.inputs, &given);
+        match options.arithmetic {
+            Arithmetic::Exact => {
+                assert_same_bits(what, &format!("{output:?}, machine code"), model, &doubles, &expected);
+                let given: Vec<f32> = given.iter().map(|x| *x as f32).collect();
+                let program = Options { precision: Precision::F32, ..options.clone() };
+                let program = together(plan, output, &program).expect("the same branches").program;
+                let expected = program.apart.evaluate(&given, |a, b, c| a * b + c);
+                let expected: Vec<f64> = expected.into_iter().map(f64::from).collect();
+                assert_same_bits(what, &format!("{output:?}, machine code, f32"), model, &singles, &expected);
+            }
+            Arithmetic::Fast => {
+                let size = expected.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+                for (results, error) in [(doubles, 1e-11), (singles, 1e-2)] {
+                    let off = results.iter().zip(&expected).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+                    assert!(off <= error * size, "{what}: {output:?} by machine code is {off:e} off, size {size:e}");
+                }
+            }
+        }
         let straight = trace(plan, output, options).expect("a program").program.counts().total();
         let apart = both.program.apart.counts().total();
         if options.arithmetic == Arithmetic::Exact {
@@ -152,6 +103,27 @@ fn compare(what: &str, model: &Model, plan: &Plan, options: &Options) -> usize {
         }
     }
     branches
+}
+
+/// An output by machine code; `given` are the entries of its inputs.
+fn by_machine_code<S: Number>(
+    plan: &Plan,
+    options: &Options,
+    s: &State,
+    output: Output,
+    inputs: &[InputArray],
+    mut given: &[f64],
+) -> Vec<f64> {
+    let mut machine = machine_code::compiled::<S>(plan, options, s);
+    let arrays = inputs.iter().map(|array| (array, given.split_off(..array.len()).expect("as many entries")));
+    let arguments = arrays.filter(|(array, _)| !array.field);
+    let arguments: Vec<Vec<S>> = arguments.map(|(_, array)| array.iter().map(|x| S::constant(*x)).collect()).collect();
+    let arguments: Vec<&[S]> = arguments.iter().map(Vec::as_slice).collect();
+    let lengths = output.spec().results.iter().map(|array| array.len(machine.sizes()));
+    let mut found: Vec<Vec<S>> = lengths.map(|len| vec![S::constant(f64::NAN); len]).collect();
+    let mut results: Vec<&mut [S]> = found.iter_mut().map(Vec::as_mut_slice).collect();
+    machine.evaluate(output, &arguments, &mut results).expect("machine code");
+    found.concat().into_iter().map(|x| x.to_f64()).collect()
 }
 
 /// Compares on one tree for each seed. Returns the number of branches.
