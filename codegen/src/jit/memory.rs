@@ -10,6 +10,8 @@
 //! - The memory of the code lives as long as the function and is never changed after it was made, so that any number of
 //!   threads may call it.
 //! - The functions for sines and cosines are called by this code alone, with parts of the working memory.
+//! - Code in vectors of 32 and 64 bytes is made only where the processor has them. It changes no register that belongs
+//!   to its caller.
 #![allow(unsafe_code)]
 
 use std::collections::BTreeMap;
@@ -21,6 +23,7 @@ use cranelift::module::{default_libcall_names, Linkage, Module};
 use cranelift::prelude::*;
 
 use super::instructions::{input_places, write, Shape, BLOCK, INPUTS};
+use super::vectors::{self, Width};
 use super::CompileError;
 use crate::code::Code;
 use crate::lower::{Memory, Spills};
@@ -28,7 +31,7 @@ use crate::options::{Arithmetic, Precision};
 use crate::output::OutputProgram;
 use mbd_runtime::kernel::{level, Level};
 use mbd_runtime::system::Real;
-use mbd_runtime::trig;
+use mbd_runtime::{trig, Packed};
 
 /// The most result arrays that a function has.
 const RESULTS: usize = 6;
@@ -40,8 +43,9 @@ const REGISTERS: usize = 13;
 /// Computes sines and cosines of `n` angles, a multiple of [`BLOCK`].
 type Sines<S> = unsafe extern "C" fn(*const S, usize, *mut S, *mut S);
 
-/// Code of a function: addresses of the input arrays, of the result arrays, and of the working memory.
-type Entry<S> = unsafe extern "C" fn(*const *const S, *const *mut S, *mut S);
+/// Code of a function: addresses of the input arrays, of the result arrays, and of the working memory. It returns 0, or
+/// another number if it gave up.
+type Entry<S> = unsafe extern "C" fn(*const *const S, *const *mut S, *mut S) -> u32;
 
 /// A number type that machine code can compute with: `f64` or `f32`.
 pub trait Number: Real + Default + Send + Sync + 'static + sealed::Sealed {
@@ -124,7 +128,7 @@ unsafe impl<S> Sync for MachineCode<S> {}
 
 impl<S: Number> MachineCode<S> {
     /// Compiles a program whose results fill arrays of the lengths `results`, for one state or for `lanes` states at once:
-    /// as many as a vector of 16 bytes has numbers. All arrays then have that many numbers side by side for each entry.
+    /// two, or as many as [`Width::of_lanes`] knows. All arrays then have that many numbers side by side for each entry.
     ///
     /// # Errors
     /// [`CompileError::Machine`] with Cranelift's words.
@@ -135,40 +139,52 @@ impl<S: Number> MachineCode<S> {
         lanes: usize,
     ) -> Result<Self, CompileError> {
         let fast = arithmetic == Arithmetic::Fast;
+        let fused = fast && level() > Level::Plain;
         let mut module = compiler(&program.program)?;
-        let (address, call) = (module.target_config().pointer_type(), module.target_config().default_call_conv);
-        let signature = |parameters: usize| {
-            let mut signature = Signature::new(call);
-            signature.params = vec![AbiParam::new(address); parameters];
-            signature
-        };
+        let mut signature = of_addresses(&module, 3);
+        signature.returns.push(AbiParam::new(types::I32));
         let tables: Vec<Box<[S]>> = match &program.program {
             Code::Straight(_) => Vec::new(),
-            Code::Rolled(rolled) => rolled.loops.iter().map(|run| run.table.concat()).map(numbers).collect(),
+            Code::Rolled(rolled) => rolled.loops.iter().map(|run| run.table.concat()).map(converted).collect(),
         };
-        let constants: BTreeMap<u64, usize> =
-            program.program.constants().into_iter().enumerate().map(|(at, bits)| (bits, at)).collect();
-        let spills = Spills::of(&program.program, REGISTERS);
-        let memory = Memory::new(&program.program, &spills, BLOCK);
-        let shape = Shape {
-            precision: S::PRECISION,
-            lanes,
-            address,
-            fused: fast && level() > Level::Plain,
-            results: &results,
-            memory: &memory,
-            spills: &spills,
-            constants: &constants,
-            tables: &tables.iter().map(|table| table.as_ptr() as usize).collect::<Vec<_>>(),
-            sines: (signature(4), S::SINES[usize::from(fast)] as usize),
-        };
-        let id = module.declare_function(program.spec.name, Linkage::Local, &signature(3));
+        let addresses: Vec<usize> = tables.iter().map(|table| table.as_ptr() as usize).collect();
+        let id = module.declare_function(program.spec.name, Linkage::Local, &signature);
         let id = id.map_err(CompileError::machine)?;
-        let mut function = Function::with_name_signature(UserFuncName::user(0, id.as_u32()), signature(3));
-        write(&mut function, program, &shape);
-        let mut context = Context::for_function(function);
-        module.define_function(id, &mut context).map_err(CompileError::machine)?;
-        let size = context.compiled_code().map_or(0, |code| code.code_info().total_size as usize);
+        let body = match Width::of_lanes(lanes) {
+            Some(width) => {
+                let written = vectors::compile(program, &results, fused, width, &addresses)
+                    .ok_or_else(|| CompileError::machine("the code is too long for vectors"))?;
+                module.define_function_bytes(id, 64, &written.bytes, &[]).map_err(CompileError::machine)?;
+                let copies = if width == Width::Eight { 1 } else { width.lanes() };
+                let constants = written.constants.iter().flat_map(|bits| vec![f64::from_bits(*bits); copies]).collect();
+                Body { scratch: written.scratch, size: written.bytes.len(), constants }
+            }
+            None => {
+                let constants: BTreeMap<u64, usize> =
+                    program.program.constants().into_iter().enumerate().map(|(at, bits)| (bits, at)).collect();
+                let spills = Spills::of(&program.program, REGISTERS);
+                let memory = Memory::new(&program.program, &spills, BLOCK);
+                let sines = of_addresses(&module, 4);
+                let shape = Shape {
+                    precision: S::PRECISION,
+                    lanes,
+                    address: module.target_config().pointer_type(),
+                    fused,
+                    results: &results,
+                    memory: &memory,
+                    spills: &spills,
+                    constants: &constants,
+                    tables: &addresses,
+                    sines: (sines, S::SINES[usize::from(fast)] as usize),
+                };
+                let mut function = Function::with_name_signature(UserFuncName::user(0, id.as_u32()), signature);
+                write(&mut function, program, &shape);
+                let mut context = Context::for_function(function);
+                module.define_function(id, &mut context).map_err(CompileError::machine)?;
+                let size = context.compiled_code().map_or(0, |code| code.code_info().total_size as usize);
+                Body { scratch: memory.len(), size, constants: constants.into_keys().map(f64::from_bits).collect() }
+            }
+        };
         module.finalize_definitions().map_err(CompileError::machine)?;
         let code = module.get_finalized_function(id);
         // SAFETY: the function was made with this signature, for the calling convention of the host.
@@ -185,9 +201,9 @@ impl<S: Number> MachineCode<S> {
             entry,
             inputs,
             results,
-            scratch: lanes * memory.len(),
-            size,
-            constants: numbers(constants.into_keys().map(f64::from_bits).collect()),
+            scratch: lanes * body.scratch,
+            size: body.size,
+            constants: converted(body.constants),
             _tables: tables,
         })
     }
@@ -208,12 +224,13 @@ impl<S: Number> MachineCode<S> {
         self.inputs[INPUTS - 1] > 0
     }
 
-    /// Runs the code. `inputs` are the arguments, then the fields.
+    /// Runs the code. `inputs` are the arguments, then the fields. Returns whether it computed the results: code in vectors
+    /// of more than 16 bytes gives up where an angle is beyond the range of the main path of sine and cosine.
     ///
     /// # Panics
     /// If a slice has another length than its array, or the working memory is too short.
     #[inline]
-    pub fn call(&self, inputs: &[&[S]; INPUTS], results: &mut [&mut [S]], scratch: &mut [S]) {
+    pub fn call(&self, inputs: &[&[S]; INPUTS], results: &mut [&mut [S]], scratch: &mut [S]) -> bool {
         assert!(scratch.len() >= self.scratch, "the working memory is too short");
         // Differences are collected without a branch.
         let other = inputs.iter().zip(&self.inputs).fold(0, |all, (input, len)| all | (input.len() ^ len));
@@ -230,8 +247,35 @@ impl<S: Number> MachineCode<S> {
             *to = input.as_ptr();
         }
         // SAFETY: see the head of this file.
-        unsafe { (self.entry)(read.as_ptr(), written.as_ptr(), scratch.as_mut_ptr()) }
+        unsafe { (self.entry)(read.as_ptr(), written.as_ptr(), scratch.as_mut_ptr()) == 0 }
     }
+}
+
+/// Numbers of several states as they are in memory.
+pub fn numbers<const L: usize>(x: &[Packed<L>]) -> &[f64] {
+    // SAFETY: `Packed<L>` is `[f64; L]` in memory (`repr(transparent)`).
+    unsafe { std::slice::from_raw_parts(x.as_ptr().cast(), L * x.len()) }
+}
+
+/// The same, to be written.
+pub fn numbers_mut<const L: usize>(x: &mut [Packed<L>]) -> &mut [f64] {
+    // SAFETY: the same.
+    unsafe { std::slice::from_raw_parts_mut(x.as_mut_ptr().cast(), L * x.len()) }
+}
+
+/// What the body of a function needs: entries of working memory, constants; and its length, bytes.
+struct Body {
+    scratch: usize,
+    size: usize,
+    constants: Vec<f64>,
+}
+
+/// The signature of a function of so many addresses.
+fn of_addresses(module: &JITModule, parameters: usize) -> Signature {
+    let target = module.target_config();
+    let mut signature = Signature::new(target.default_call_conv);
+    signature.params = vec![AbiParam::new(target.pointer_type()); parameters];
+    signature
 }
 
 /// A compiler for some code on this processor.
@@ -247,7 +291,7 @@ fn compiler(code: &Code) -> Result<JITModule, CompileError> {
     Ok(JITModule::new(JITBuilder::with_isa(isa, default_libcall_names())))
 }
 
-fn numbers<S: Number>(table: Vec<f64>) -> Box<[S]> {
+fn converted<S: Number>(table: Vec<f64>) -> Box<[S]> {
     table.into_iter().map(S::constant).collect()
 }
 
