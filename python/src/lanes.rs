@@ -1,6 +1,6 @@
 //! Several rows at once, in vector registers.
 
-use multibody::codegen::jit::{Compiled, CompiledLanes, LANES};
+use multibody::codegen::jit::{best_lanes, Compiled, CompiledLanes};
 use multibody::runtime::integrate::{Euler, Midpoint, Rk4, Stepper};
 use multibody::runtime::{Packed, Scalar, System};
 
@@ -8,10 +8,44 @@ use crate::machines::set;
 use crate::rollout::{Item, Motion, State};
 use crate::rows::Beat;
 
-type Method = Box<dyn Stepper<CompiledLanes>>;
+/// Several states at once, as many as the vectors of the processor have numbers or fewer.
+#[derive(Clone)]
+pub enum AnyLanes {
+    /// Vectors of 16 bytes.
+    Two(CompiledLanes<2>),
+    /// Of 32.
+    Four(CompiledLanes<4>),
+    /// Of 64.
+    Eight(CompiledLanes<8>),
+}
+
+impl AnyLanes {
+    /// `most` states or more, if there are such vectors. `None` where the mechanism is too large.
+    pub fn new(of: &Compiled, most: usize) -> Option<AnyLanes> {
+        let eight = || of.lanes().ok().map(AnyLanes::Eight);
+        let four = || of.lanes().ok().map(AnyLanes::Four);
+        let best = match most.next_power_of_two().min(best_lanes()) {
+            8 => eight().or_else(four),
+            4 => four(),
+            _ => None,
+        };
+        best.or_else(|| of.lanes().ok().map(AnyLanes::Two))
+    }
+
+    /// Number of states.
+    pub fn width(&self) -> usize {
+        match self {
+            AnyLanes::Two(_) => 2,
+            AnyLanes::Four(_) => 4,
+            AnyLanes::Eight(_) => 8,
+        }
+    }
+}
+
+type Method<const L: usize> = Box<dyn Stepper<CompiledLanes<L>>>;
 
 /// The methods whose steps do not depend on what the states are.
-fn method(name: &str, lanes: &CompiledLanes) -> Option<Method> {
+fn method<const L: usize>(name: &str, lanes: &CompiledLanes<L>) -> Option<Method<L>> {
     Some(match name {
         "euler" => Box::new(Euler::new(lanes)),
         "midpoint" => Box::new(Midpoint::new(lanes)),
@@ -26,39 +60,59 @@ pub fn possible(method: &str, tolerance: Option<f64>) -> bool {
 }
 
 /// States side by side.
-struct Block {
-    q: Vec<Packed<LANES>>,
-    p: Vec<Packed<LANES>>,
-    v: Vec<Packed<LANES>>,
+struct Block<const L: usize> {
+    q: Vec<Packed<L>>,
+    p: Vec<Packed<L>>,
+    v: Vec<Packed<L>>,
 }
 
-fn pack(lanes: &mut [Packed<LANES>], lane: usize, from: &[f64]) {
+fn pack<const L: usize>(lanes: &mut [Packed<L>], lane: usize, from: &[f64]) {
     lanes.iter_mut().zip(from).for_each(|(to, from)| to.0[lane] = *from);
 }
 
-fn unpack(lanes: &[Packed<LANES>], lane: usize, to: &mut [f64]) {
+fn unpack<const L: usize>(lanes: &[Packed<L>], lane: usize, to: &mut [f64]) {
     to.iter_mut().zip(lanes).for_each(|(to, from)| *to = from.0[lane]);
 }
 
 impl Motion<'_> {
-    /// Computes as many rows as there are lanes. `None` where one of them fails: they have to be computed one by one.
+    /// Computes as many rows as there are lanes, or fewer. `None` where one of them fails: they have to be computed one by
+    /// one.
     pub fn rows_at_once(
         &self,
-        (machine, lanes): (&mut Compiled, &mut CompiledLanes),
-        items: &mut [Item; LANES],
+        machine: &mut Compiled,
+        lanes: &mut AnyLanes,
+        items: &mut [Item],
+        beat: &mut Beat,
+    ) -> Option<()> {
+        match lanes {
+            AnyLanes::Two(lanes) => self.rows_in_lanes(machine, lanes, items, beat),
+            AnyLanes::Four(lanes) => self.rows_in_lanes(machine, lanes, items, beat),
+            AnyLanes::Eight(lanes) => self.rows_in_lanes(machine, lanes, items, beat),
+        }
+    }
+
+    fn rows_in_lanes<const L: usize>(
+        &self,
+        machine: &mut Compiled,
+        lanes: &mut CompiledLanes<L>,
+        items: &mut [Item],
         beat: &mut Beat,
     ) -> Option<()> {
         let mut block = Block { q: lanes.neutral(), p: lanes.zero_momenta(), v: lanes.zero_momenta() };
-        let mut states = Vec::with_capacity(LANES);
+        let mut states = Vec::with_capacity(L);
         for (lane, (k, ..)) in items.iter().enumerate() {
             self.fields.iter().for_each(|(field, rows)| set(machine, *field, rows.row(*k)));
             machine.inputs().tau.fill(0.0);
-            lanes.take_inputs(lane, machine);
             let state = self.begin(machine, *k).ok()?;
             // Lengths of quaternions are only seen of the first lane.
             self.check_units(machine, &state.q).ok()?;
-            pack(&mut block.q, lane, &state.q);
-            pack(&mut block.p, lane, &state.p);
+            // Lanes without a row compute the last one once more.
+            let end = if lane + 1 == items.len() { L } else { lane + 1 };
+            for lane in lane..end {
+                lanes.take_inputs(lane, machine);
+                pack(&mut block.q, lane, &state.q);
+                pack(&mut block.p, lane, &state.p);
+            }
             states.push(state);
         }
         let mut method = method(&self.settings.method, lanes)?;
@@ -90,12 +144,12 @@ impl Motion<'_> {
     }
 
     /// Writes the states as rows of the results.
-    fn store_block(
+    fn store_block<const L: usize>(
         &self,
-        lanes: &mut CompiledLanes,
-        block: &mut Block,
+        lanes: &mut CompiledLanes<L>,
+        block: &mut Block<L>,
         states: &mut [State],
-        items: &mut [Item; LANES],
+        items: &mut [Item],
         written: usize,
     ) {
         if !self.settings.momenta {
