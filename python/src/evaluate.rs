@@ -8,6 +8,7 @@ use pyo3::types::PyTuple;
 
 use crate::arrays::{result, writable, Given, Rows};
 use crate::errors::compile_error;
+use crate::lanes::AnyLanes;
 use crate::machines::{set, Inputs, Machines};
 
 /// Number of states from which on other threads of Python may run meanwhile.
@@ -82,16 +83,26 @@ struct Work<'a> {
 impl Work<'_> {
     fn run(&self, machine: &mut Compiled, mut rest: Vec<&mut [f64]>) -> Result<(), CompileError> {
         let lengths: Vec<usize> = rest.iter().map(|all| all.len() / self.count.max(1)).collect();
-        for k in 0..self.count {
+        let mut next = |rows: usize| -> Vec<&mut [f64]> {
+            let cut = |(all, len): (&mut &mut [f64], &usize)| all.split_off_mut(..rows * len).unwrap_or_default();
+            rest.iter_mut().zip(&lengths).map(cut).collect()
+        };
+        let mut k = 0;
+        if self.count >= MANY {
+            if let Some(mut lanes) = AnyLanes::new(machine, usize::MAX) {
+                let possible = lanes.prepare(self.output).is_ok();
+                while possible && k < self.count {
+                    let end = (k + lanes.width()).min(self.count);
+                    lanes.evaluate(self.output, (self.arguments, self.fields), k..end, &mut next(end - k))?;
+                    k = end;
+                }
+            }
+        }
+        while k < self.count {
             self.fields.iter().for_each(|(field, rows)| set(machine, *field, rows.row(k)));
             let arguments: Vec<&[f64]> = self.arguments.iter().map(|rows| rows.row(k)).collect();
-            let mut results = Vec::with_capacity(rest.len());
-            for (all, len) in rest.iter_mut().zip(&lengths) {
-                let (row, after) = std::mem::take(all).split_at_mut(*len);
-                results.push(row);
-                *all = after;
-            }
-            machine.evaluate_or_interpret(self.output, &arguments, &mut results)?;
+            machine.evaluate_or_interpret(self.output, &arguments, &mut next(1))?;
+            k += 1;
         }
         Ok(())
     }

@@ -1,9 +1,13 @@
-//! Several rows at once, in vector registers.
+//! Several rows at once, in vector registers: rollouts and outputs.
 
-use multibody::codegen::jit::{best_lanes, Compiled, CompiledLanes};
+use std::ops::Range;
+
+use multibody::codegen::jit::{best_lanes, CompileError, Compiled, CompiledLanes};
+use multibody::codegen::output::Output;
 use multibody::runtime::integrate::{Euler, Midpoint, Rk4, Stepper};
 use multibody::runtime::{Packed, Scalar, System};
 
+use crate::arrays::Rows;
 use crate::machines::set;
 use crate::rollout::{Item, Motion, State};
 use crate::rows::Beat;
@@ -24,12 +28,24 @@ impl AnyLanes {
     pub fn new(of: &Compiled, most: usize) -> Option<AnyLanes> {
         let eight = || of.lanes().ok().map(AnyLanes::Eight);
         let four = || of.lanes().ok().map(AnyLanes::Four);
-        let best = match most.next_power_of_two().min(best_lanes()) {
+        let best = match most.min(best_lanes()).next_power_of_two() {
             8 => eight().or_else(four),
             4 => four(),
             _ => None,
         };
         best.or_else(|| of.lanes().ok().map(AnyLanes::Two))
+    }
+
+    /// Compiles an output.
+    ///
+    /// # Errors
+    /// Those of the compiler.
+    pub fn prepare(&mut self, output: Output) -> Result<(), CompileError> {
+        match self {
+            AnyLanes::Two(lanes) => lanes.prepare(output),
+            AnyLanes::Four(lanes) => lanes.prepare(output),
+            AnyLanes::Eight(lanes) => lanes.prepare(output),
+        }
     }
 
     /// Number of states.
@@ -171,6 +187,57 @@ impl Motion<'_> {
                     layout.v_to(&state.q, &state.v, v);
                 }
             }
+        }
+    }
+}
+
+/// Computes an output of some rows at once, `L` or fewer: `fields` are the inputs beside the arguments.
+fn evaluate_in_lanes<const L: usize>(
+    lanes: &mut CompiledLanes<L>,
+    output: Output,
+    (arguments, fields): (&[Rows], &[(usize, Rows)]),
+    range: Range<usize>,
+    results: &mut [&mut [f64]],
+) -> Result<(), CompileError> {
+    // Lanes without a row compute the last one once more.
+    let row = |lane: usize| (range.start + lane).min(range.end - 1);
+    for lane in 0..L {
+        fields.iter().for_each(|(field, rows)| lanes.set_field(lane, *field, rows.row(row(lane))));
+    }
+    let packed = |rows: &Rows| -> Vec<Packed<L>> {
+        let mut all = vec![Packed::zero(); rows.row(range.start).len()];
+        (0..L).for_each(|lane| pack(&mut all, lane, rows.row(row(lane))));
+        all
+    };
+    let arguments: Vec<Vec<Packed<L>>> = arguments.iter().map(packed).collect();
+    let arguments: Vec<&[Packed<L>]> = arguments.iter().map(Vec::as_slice).collect();
+    let n = range.len();
+    let mut found: Vec<Vec<Packed<L>>> = results.iter().map(|all| vec![Packed::zero(); all.len() / n]).collect();
+    let mut places: Vec<&mut [Packed<L>]> = found.iter_mut().map(Vec::as_mut_slice).collect();
+    lanes.evaluate(output, &arguments, &mut places)?;
+    for (to, from) in results.iter_mut().zip(&found) {
+        // Results without numbers have no rows to write.
+        to.chunks_exact_mut(from.len().max(1)).enumerate().for_each(|(lane, to)| unpack(from, lane, to));
+    }
+    Ok(())
+}
+
+impl AnyLanes {
+    /// Computes an output of some rows, no more than there are lanes.
+    ///
+    /// # Errors
+    /// Those of the compiler.
+    pub fn evaluate(
+        &mut self,
+        output: Output,
+        given: (&[Rows], &[(usize, Rows)]),
+        range: Range<usize>,
+        results: &mut [&mut [f64]],
+    ) -> Result<(), CompileError> {
+        match self {
+            AnyLanes::Two(lanes) => evaluate_in_lanes(lanes, output, given, range, results),
+            AnyLanes::Four(lanes) => evaluate_in_lanes(lanes, output, given, range, results),
+            AnyLanes::Eight(lanes) => evaluate_in_lanes(lanes, output, given, range, results),
         }
     }
 }

@@ -313,8 +313,14 @@ impl<S: Number> Compiled<S> {
         let plan = plan.acting(acts);
         let interpreter = self.interpreter.acting(acts);
         let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
-        let shared =
-            Shared { plan, options, sizes: *sizes, outputs, coordinate_rates: OnceLock::new(), lanes: AllLanes::default() };
+        let shared = Shared {
+            plan,
+            options,
+            sizes: *sizes,
+            outputs,
+            coordinate_rates: OnceLock::new(),
+            lanes: AllLanes::default(),
+        };
         Compiled { shared: Arc::new(shared), interpreter, calls: vec![0; self.calls.len()], ..self.clone() }
     }
 

@@ -7,7 +7,7 @@ use mbd_runtime::{Interpreter, Packed, Scalar};
 
 use super::compiled::Shared;
 use super::instructions::{ARGUMENTS, INPUTS};
-use super::memory::{numbers, numbers_mut, MachineCode};
+use super::memory::{numbers, numbers_mut, MachineCode, RESULTS};
 use super::vectors::Width;
 use super::{CompileError, Compiled};
 use crate::output::{Output, FIELDS};
@@ -21,24 +21,28 @@ pub fn best_lanes() -> usize {
     WIDTHS.into_iter().filter(|lanes| Width::of_lanes(*lanes).is_some()).max().unwrap_or(WIDTHS[0])
 }
 
+/// Code of a function, once somebody has asked for it.
+type Made = OnceLock<Result<MachineCode<f64>, CompileError>>;
+
 /// The machine code of several states, for each of [`WIDTHS`].
 #[derive(Debug, Default)]
-pub(super) struct AllLanes([OnceLock<Result<LanesCode, CompileError>>; WIDTHS.len()]);
+pub(super) struct AllLanes([OfWidth; WIDTHS.len()]);
 
-#[derive(Debug)]
-struct LanesCode {
-    rates: MachineCode<f64>,
-    velocities: MachineCode<f64>,
-    coordinate_rates: MachineCode<f64>,
+#[derive(Debug, Default)]
+struct OfWidth {
+    /// One for each of [`Output::ALL`].
+    outputs: [Made; Output::ALL.len()],
+    coordinate_rates: Made,
 }
 
 impl AllLanes {
-    fn code(&self, lanes: usize) -> Option<&OnceLock<Result<LanesCode, CompileError>>> {
-        self.0.get(WIDTHS.iter().position(|width| *width == lanes)?)
+    fn of_width(&self, lanes: usize) -> Option<&OfWidth> {
+        let known = lanes == WIDTHS[0] || Width::of_lanes(lanes).is_some();
+        self.0.get(WIDTHS.iter().position(|width| *width == lanes).filter(|_| known)?)
     }
 }
 
-/// `L` states of a mechanism at once, for methods of integration: a [`System`] over [`Packed`]. `L` is 2, or up to
+/// `L` states of a mechanism at once: every output, and for methods of integration a [`System`] over [`Packed`]. `L` is 2, or up to
 /// [`best_lanes`] 4 or 8. Every state has the bits that [`Compiled`] gives it.
 #[derive(Clone, Debug)]
 pub struct CompiledLanes<const L: usize> {
@@ -78,17 +82,6 @@ impl Compiled<f64> {
     /// no vectors of `L` numbers.
     pub fn lanes<const L: usize>(&self) -> Result<CompiledLanes<L>, CompileError> {
         let shared = &self.shared;
-        let none = || CompileError::machine(format!("there are no vectors of {L} numbers"));
-        let cell = shared.lanes.code(L).filter(|_| L == WIDTHS[0] || Width::of_lanes(L).is_some()).ok_or_else(none)?;
-        let make = || {
-            Ok(LanesCode {
-                rates: shared.compiled(Output::Rates, L)?,
-                velocities: shared.compiled(Output::Velocities, L)?,
-                coordinate_rates: shared.compiled_coordinate_rates(L)?,
-            })
-        };
-        let code = cell.get_or_init(make).as_ref().map_err(CompileError::clone)?;
-        let scratch = code.rates.scratch().max(code.velocities.scratch()).max(code.coordinate_rates.scratch());
         let sizes = self.sizes();
         let mut lanes = CompiledLanes {
             shared: shared.clone(),
@@ -96,8 +89,11 @@ impl Compiled<f64> {
             interpreter: self.interpreter.clone(),
             fields: Default::default(),
             sizes: [sizes.nq, sizes.nv],
-            scratch: Scratch::new(scratch),
+            scratch: Scratch(Vec::new()),
         };
+        lanes.prepare(Output::Rates)?;
+        lanes.prepare(Output::Velocities)?;
+        lanes.coordinate_rates_code()?;
         (0..L).for_each(|lane| lanes.take_inputs(lane, self));
         Ok(lanes)
     }
@@ -121,18 +117,66 @@ impl<const L: usize> CompiledLanes<L> {
         set::<L>(&mut self.fields[0], lane, tau);
     }
 
-    fn code(&self) -> Option<&LanesCode> {
-        self.shared.lanes.code(L)?.get()?.as_ref().ok()
+    /// Sets a field of the functions ([`FIELDS`], by its number) of a lane.
+    pub fn set_field(&mut self, lane: usize, field: usize, row: &[f64]) {
+        set::<L>(&mut self.fields[field], lane, row);
+    }
+
+    fn of_width(&self) -> Result<&OfWidth, CompileError> {
+        let none = || CompileError::machine(format!("there are no vectors of {L} numbers"));
+        self.shared.lanes.of_width(L).ok_or_else(none)
+    }
+
+    fn code(&self, output: Output) -> Result<&MachineCode<f64>, CompileError> {
+        let make = || self.shared.compiled(output, L);
+        // The list has the order of the enumeration.
+        self.of_width()?.outputs[output as usize].get_or_init(make).as_ref().map_err(CompileError::clone)
+    }
+
+    fn coordinate_rates_code(&self) -> Result<&MachineCode<f64>, CompileError> {
+        let make = || self.shared.compiled_coordinate_rates(L);
+        self.of_width()?.coordinate_rates.get_or_init(make).as_ref().map_err(CompileError::clone)
+    }
+
+    /// Compiles an output now, in place of at its first evaluation.
+    ///
+    /// # Errors
+    /// [`CompileError`]; it is `TooLarge` where [`Compiled`] uses the interpreter.
+    pub fn prepare(&mut self, output: Output) -> Result<(), CompileError> {
+        let scratch = self.code(output)?.scratch();
+        if self.scratch.0.len() < scratch + LINE {
+            self.scratch = Scratch::new(scratch);
+        }
+        Ok(())
+    }
+
+    /// Computes an output of all states: its arguments and results are those of the generated function ([`Output::spec`]),
+    /// as flat slices.
+    ///
+    /// # Errors
+    /// As of [`CompiledLanes::prepare`].
+    ///
+    /// # Panics
+    /// If an array has another length than that of the function.
+    pub fn evaluate(
+        &mut self,
+        output: Output,
+        arguments: &[&[Packed<L>]],
+        results: &mut [&mut [Packed<L>]],
+    ) -> Result<(), CompileError> {
+        self.prepare(output)?;
+        let mut scratch = std::mem::replace(&mut self.scratch, Scratch(Vec::new()));
+        let done = self.code(output).map(|code| {
+            self.call(code, || self.shared.output(output), arguments, results, &mut scratch);
+        });
+        self.scratch = scratch;
+        done
     }
 
     /// Velocities from momenta, `(q, p) → v`.
     pub fn velocities(&mut self, q: &[Packed<L>], p: &[Packed<L>], v: &mut [Packed<L>]) {
-        let mut scratch = std::mem::replace(&mut self.scratch, Scratch(Vec::new()));
-        if let Some(code) = self.code() {
-            let one = || self.shared.output(Output::Velocities);
-            self.call(&code.velocities, one, [q, p], &mut [v], &mut scratch);
-        }
-        self.scratch = scratch;
+        let done = self.evaluate(Output::Velocities, &[q, p], &mut [v]);
+        debug_assert!(done.is_ok(), "the code was made with the lanes");
     }
 
     /// Calls machine code, or that of one state for one after the other.
@@ -140,21 +184,23 @@ impl<const L: usize> CompiledLanes<L> {
         &self,
         code: &MachineCode<f64>,
         one: impl FnOnce() -> Result<&'a MachineCode<f64>, &'a CompileError>,
-        arguments: [&[Packed<L>]; 2],
+        arguments: &[&[Packed<L>]],
         results: &mut [&mut [Packed<L>]],
         scratch: &mut Scratch,
     ) {
         let mut given: [&[f64]; INPUTS] = [&[]; INPUTS];
-        given[..arguments.len()].copy_from_slice(&arguments.map(numbers));
+        for (to, from) in given.iter_mut().zip(arguments) {
+            *to = numbers(from);
+        }
         for (to, from) in given[ARGUMENTS..].iter_mut().zip(&self.fields) {
             *to = from;
         }
-        let done = match results {
-            [a, b] => code.call(&given, &mut [numbers_mut(a), numbers_mut(b)], scratch.numbers()),
-            [a] => code.call(&given, &mut [numbers_mut(a)], scratch.numbers()),
-            _ => false,
-        };
-        // Its code was made before that of several states, from the same program.
+        let (n, mut places): (usize, [&mut [f64]; RESULTS]) = (results.len(), Default::default());
+        for (to, from) in places.iter_mut().zip(results.iter_mut()) {
+            *to = numbers_mut(from);
+        }
+        let done = code.call(&given, &mut places[..n], scratch.numbers());
+        // Too large angles: its code is made of the same program.
         if let (false, Ok(one)) = (done, one()) {
             one_by_one::<L>(one, &given, results);
         }
@@ -207,11 +253,8 @@ impl<const L: usize> System for CompiledLanes<L> {
         qd: &mut Vec<Packed<L>>,
         pd: &mut Vec<Packed<L>>,
     ) {
-        let mut scratch = std::mem::replace(&mut self.scratch, Scratch(Vec::new()));
-        if let Some(code) = self.code() {
-            self.call(&code.rates, || self.shared.output(Output::Rates), [q, p], &mut [qd, pd], &mut scratch);
-        }
-        self.scratch = scratch;
+        let done = self.evaluate(Output::Rates, &[q, p], &mut [qd, pd]);
+        debug_assert!(done.is_ok(), "the code was made with the lanes");
     }
 
     fn part_name(&self, part: Part) -> Option<&str> {
@@ -219,9 +262,9 @@ impl<const L: usize> System for CompiledLanes<L> {
     }
 
     fn coordinate_rates(&self, q: &Vec<Packed<L>>, v: &Vec<Packed<L>>, qd: &mut Vec<Packed<L>>) {
-        let Some(code) = self.code() else { return };
-        let mut scratch = Scratch::new(code.coordinate_rates.scratch());
-        self.call(&code.coordinate_rates, || self.shared.coordinate_rates(), [q, v], &mut [qd], &mut scratch);
+        let Ok(code) = self.coordinate_rates_code() else { return };
+        let mut scratch = Scratch::new(code.scratch());
+        self.call(code, || self.shared.coordinate_rates(), &[q, v], &mut [qd], &mut scratch);
     }
 }
 
@@ -295,6 +338,15 @@ mod tests {
         let mut turned = q.clone();
         lanes.coordinate_rates(&q, &v, &mut turned);
         assert_eq!(turned, pack(|w| &w.5), "{file}");
+        let mut tau = lanes.zero_momenta();
+        if lanes.evaluate(Output::InverseDynamics, &[&q, &v, &p], &mut [&mut tau]).is_ok() {
+            for (lane, w) in wanted.iter().enumerate() {
+                let mut one = single.zero_momenta();
+                states[lane].set_inputs(plan, single.inputs(), true);
+                single.evaluate(Output::InverseDynamics, &[&w.0, &w.2, &w.1], &mut [&mut one]).expect("machine code");
+                assert_eq!(tau.iter().map(|x| x.0[lane]).collect::<Vec<_>>(), one, "{file}");
+            }
+        }
     }
 
     /// Coordinates, momenta, velocities, rates of both, coordinate rates of the velocities.

@@ -34,7 +34,7 @@ use mbd_runtime::system::Real;
 use mbd_runtime::{trig, Packed};
 
 /// The most result arrays that a function has.
-const RESULTS: usize = 6;
+pub const RESULTS: usize = 6;
 
 /// Values of straight-line code that are in registers at a time. The processors have 16 or 32 for numbers, of which an
 /// instruction needs one or two more.

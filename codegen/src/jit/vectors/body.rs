@@ -38,14 +38,28 @@ pub enum Step {
     Load(Entry),
     Binary(Binary, Id, Id),
     /// `±a · b ± c`
-    Fused { a: Id, b: Id, c: Id, minus_product: bool, minus_addend: bool },
+    Fused {
+        a: Id,
+        b: Id,
+        c: Id,
+        minus_product: bool,
+        minus_addend: bool,
+    },
     Sqrt(Id),
     /// Shifted to the left, as an integer.
     Shift(Id, u8),
     /// `yes` where the sign of the mask is set, otherwise `no`.
-    Select { mask: Id, yes: Id, no: Id },
+    Select {
+        mask: Id,
+        yes: Id,
+        no: Id,
+    },
     /// `x`, or 0 where `value <= floor`.
-    ZeroBelow { value: Id, floor: Id, x: Id },
+    ZeroBelow {
+        value: Id,
+        floor: Id,
+        x: Id,
+    },
 }
 
 impl Step {
@@ -72,9 +86,15 @@ pub enum Item {
     /// The function gives up if the sign of a lane is set.
     ExitIfSigns(Id),
     /// A loop of so many turns begins. No value is read on its other side.
-    Open { turns: usize, backward: bool },
+    Open {
+        turns: usize,
+        backward: bool,
+    },
     /// It ends.
-    Close { turns: usize, backward: bool },
+    Close {
+        turns: usize,
+        backward: bool,
+    },
 }
 
 /// A value as the program has it: the negative of one that is computed costs nothing where it can be a part of what

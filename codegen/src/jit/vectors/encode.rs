@@ -156,7 +156,8 @@ impl Assembler {
         let (r, r2) = (reg >> 3 & 1, reg >> 4 & 1);
         let low = |v: u8| (!v & 15) << 3;
         if self.evex() {
-            let broadcast = matches!(last, Last::Memory(Address { broadcast: true, .. })) && code.byte != BROADCAST.byte;
+            let broadcast =
+                matches!(last, Last::Memory(Address { broadcast: true, .. })) && code.byte != BROADCAST.byte;
             let first = (1 - r) << 7 | (1 - x) << 6 | (1 - b) << 5 | (1 - r2) << 4 | code.map as u8;
             let second = 1 << 7 | low(v) | 1 << 2 | code.prefix;
             let third = u8::from(zero) << 7 | 2 << 5 | u8::from(broadcast) << 4 | (1 - (v >> 4)) << 3 | mask;
@@ -345,7 +346,8 @@ mod tests {
                 ("c5 a5 73 f3 3e", &|a| a.shift_left(11, 3, 62)),
                 ("c4 e3 6d 4b cb c0", &|a| a.select(1, 12, 3, 2)),
                 ("c4 22 7d 19 44 10 10", &|a| {
-                    let address = Address { base: General::Rax, index: Some(General::R10), offset: 16, broadcast: true };
+                    let address =
+                        Address { base: General::Rax, index: Some(General::R10), offset: 16, broadcast: true };
                     a.broadcast(8, address);
                 }),
                 ("c5 cd c2 ef 12 c4 c1 55 df e8", &|a| a.zero_below(5, 6, 7, 8)),
@@ -368,7 +370,9 @@ mod tests {
                     a.vector(SUB, 1, Some(17), Last::Memory(address));
                 }),
                 ("62 61 fd 48 11 ba 00 20 00 00", &|a| a.vector(STORE, 31, None, at(General::Rdx, 0x2000))),
-                ("62 a2 d5 40 98 e6", &|a| a.vector(fused(Order::Product132, false, false), 20, Some(21), register(22))),
+                ("62 a2 d5 40 98 e6", &|a| {
+                    a.vector(fused(Order::Product132, false, false), 20, Some(21), register(22))
+                }),
                 ("62 f1 8d 40 73 f3 3f", &|a| a.shift_left(30, 3, 63)),
                 ("62 92 fe 48 39 c9 62 f2 e5 41 65 d4", &|a| a.select(2, 25, 4, 19)),
                 ("62 b1 cd 48 c2 c9 16 62 91 fd c9 28 ec", &|a| a.zero_below(5, 6, 17, 28)),
