@@ -82,30 +82,27 @@ struct Work<'a> {
 
 impl Work<'_> {
     fn run(&self, machine: &mut Compiled, mut rest: Vec<&mut [f64]>) -> Result<(), CompileError> {
-        let lengths: Vec<usize> = rest.iter().map(|all| all.len() / self.count.max(1)).collect();
-        let mut next = |rows: usize| -> Vec<&mut [f64]> {
-            let cut = |(all, len): (&mut &mut [f64], &usize)| all.split_off_mut(..rows * len).unwrap_or_default();
-            rest.iter_mut().zip(&lengths).map(cut).collect()
-        };
-        let mut k = 0;
         if self.count >= MANY {
             if let Some(mut lanes) = AnyLanes::new(machine, usize::MAX) {
-                let possible = lanes.prepare(self.output).is_ok();
-                while possible && k < self.count {
-                    let end = (k + lanes.width()).min(self.count);
-                    lanes.evaluate(self.output, (self.arguments, self.fields), k..end, &mut next(end - k))?;
-                    k = end;
+                if lanes.prepare(self.output).is_ok() {
+                    return lanes.evaluate(self.output, (self.arguments, self.fields), self.count, &mut rest);
                 }
             }
         }
-        while k < self.count {
+        let lengths: Vec<usize> = rest.iter().map(|all| all.len() / self.count.max(1)).collect();
+        for k in 0..self.count {
             self.fields.iter().for_each(|(field, rows)| set(machine, *field, rows.row(k)));
             let arguments: Vec<&[f64]> = self.arguments.iter().map(|rows| rows.row(k)).collect();
-            machine.evaluate_or_interpret(self.output, &arguments, &mut next(1))?;
-            k += 1;
+            let mut results: Vec<_> = rest.iter_mut().zip(&lengths).map(|(all, len)| first(all, *len)).collect();
+            machine.evaluate_or_interpret(self.output, &arguments, &mut results)?;
         }
         Ok(())
     }
+}
+
+/// Takes the first numbers away from the rest.
+fn first<'a>(rest: &mut &'a mut [f64], n: usize) -> &'a mut [f64] {
+    rest.split_off_mut(..n).unwrap_or_default()
 }
 
 /// The output of a name.

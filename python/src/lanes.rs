@@ -1,7 +1,5 @@
 //! Several rows at once, in vector registers: rollouts and outputs.
 
-use std::ops::Range;
-
 use multibody::codegen::jit::{best_lanes, CompileError, Compiled, CompiledLanes};
 use multibody::codegen::output::Output;
 use multibody::runtime::integrate::{Euler, Midpoint, Rk4, Stepper};
@@ -191,39 +189,46 @@ impl Motion<'_> {
     }
 }
 
-/// Computes an output of some rows at once, `L` or fewer: `fields` are the inputs beside the arguments.
+/// Entries that are written to one row after the other, as many as fill a cache line.
+const LINE: usize = 8;
+
+/// Computes an output of `count` rows, `L` of them at a time: `fields` are the inputs beside the arguments. `results` have
+/// one row after the other.
 fn evaluate_in_lanes<const L: usize>(
     lanes: &mut CompiledLanes<L>,
     output: Output,
     (arguments, fields): (&[Rows], &[(usize, Rows)]),
-    range: Range<usize>,
+    count: usize,
     results: &mut [&mut [f64]],
 ) -> Result<(), CompileError> {
-    // Lanes without a row compute the last one once more.
-    let row = |lane: usize| (range.start + lane).min(range.end - 1);
-    for lane in 0..L {
-        fields.iter().for_each(|(field, rows)| lanes.set_field(lane, *field, rows.row(row(lane))));
-    }
-    let packed = |rows: &Rows| -> Vec<Packed<L>> {
-        let mut all = vec![Packed::zero(); rows.row(range.start).len()];
-        (0..L).for_each(|lane| pack(&mut all, lane, rows.row(row(lane))));
-        all
-    };
-    let arguments: Vec<Vec<Packed<L>>> = arguments.iter().map(packed).collect();
-    let arguments: Vec<&[Packed<L>]> = arguments.iter().map(Vec::as_slice).collect();
-    let n = range.len();
-    let mut found: Vec<Vec<Packed<L>>> = results.iter().map(|all| vec![Packed::zero(); all.len() / n]).collect();
-    let mut places: Vec<&mut [Packed<L>]> = found.iter_mut().map(Vec::as_mut_slice).collect();
-    lanes.evaluate(output, &arguments, &mut places)?;
-    for (to, from) in results.iter_mut().zip(&found) {
-        // Results without numbers have no rows to write.
-        to.chunks_exact_mut(from.len().max(1)).enumerate().for_each(|(lane, to)| unpack(from, lane, to));
+    let lengths: Vec<usize> = results.iter().map(|all| all.len() / count).collect();
+    let memory = |len: usize| vec![Packed::<L>::zero(); len];
+    let mut given: Vec<Vec<Packed<L>>> = arguments.iter().map(|rows| memory(rows.row(0).len())).collect();
+    let mut found: Vec<Vec<Packed<L>>> = lengths.iter().map(|len| memory(*len)).collect();
+    for begin in (0..count).step_by(L) {
+        for lane in 0..L {
+            // Lanes without a row compute the last one once more.
+            let row = (begin + lane).min(count - 1);
+            fields.iter().for_each(|(field, rows)| lanes.set_field(lane, *field, rows.row(row)));
+            arguments.iter().zip(&mut given).for_each(|(rows, to)| pack(to, lane, rows.row(row)));
+        }
+        let given: Vec<&[Packed<L>]> = given.iter().map(Vec::as_slice).collect();
+        let mut places: Vec<&mut [Packed<L>]> = found.iter_mut().map(Vec::as_mut_slice).collect();
+        lanes.evaluate(output, &given, &mut places)?;
+        for ((to, from), len) in results.iter_mut().zip(&found).zip(&lengths) {
+            let to = &mut to[begin * len..((begin + L).min(count)) * len];
+            for (block, from) in from.chunks(LINE).enumerate() {
+                let at = block * LINE;
+                let rows = to.chunks_exact_mut(*len).enumerate();
+                rows.for_each(|(lane, to)| unpack(from, lane, &mut to[at..at + from.len()]));
+            }
+        }
     }
     Ok(())
 }
 
 impl AnyLanes {
-    /// Computes an output of some rows, no more than there are lanes.
+    /// Computes an output of `count` rows.
     ///
     /// # Errors
     /// Those of the compiler.
@@ -231,13 +236,13 @@ impl AnyLanes {
         &mut self,
         output: Output,
         given: (&[Rows], &[(usize, Rows)]),
-        range: Range<usize>,
+        count: usize,
         results: &mut [&mut [f64]],
     ) -> Result<(), CompileError> {
         match self {
-            AnyLanes::Two(lanes) => evaluate_in_lanes(lanes, output, given, range, results),
-            AnyLanes::Four(lanes) => evaluate_in_lanes(lanes, output, given, range, results),
-            AnyLanes::Eight(lanes) => evaluate_in_lanes(lanes, output, given, range, results),
+            AnyLanes::Two(lanes) => evaluate_in_lanes(lanes, output, given, count, results),
+            AnyLanes::Four(lanes) => evaluate_in_lanes(lanes, output, given, count, results),
+            AnyLanes::Eight(lanes) => evaluate_in_lanes(lanes, output, given, count, results),
         }
     }
 }
