@@ -8,6 +8,7 @@ use pyo3::types::PyTuple;
 
 use crate::arrays::{result, writable, Given, Rows};
 use crate::errors::compile_error;
+use crate::lanes::AnyLanes;
 use crate::machines::{set, Inputs, Machines};
 
 /// Number of states from which on other threads of Python may run meanwhile.
@@ -81,20 +82,27 @@ struct Work<'a> {
 
 impl Work<'_> {
     fn run(&self, machine: &mut Compiled, mut rest: Vec<&mut [f64]>) -> Result<(), CompileError> {
+        if self.count >= MANY {
+            if let Some(mut lanes) = AnyLanes::new(machine, usize::MAX) {
+                if lanes.prepare(self.output).is_ok() {
+                    return lanes.evaluate(self.output, (self.arguments, self.fields), self.count, &mut rest);
+                }
+            }
+        }
         let lengths: Vec<usize> = rest.iter().map(|all| all.len() / self.count.max(1)).collect();
         for k in 0..self.count {
             self.fields.iter().for_each(|(field, rows)| set(machine, *field, rows.row(k)));
             let arguments: Vec<&[f64]> = self.arguments.iter().map(|rows| rows.row(k)).collect();
-            let mut results = Vec::with_capacity(rest.len());
-            for (all, len) in rest.iter_mut().zip(&lengths) {
-                let (row, after) = std::mem::take(all).split_at_mut(*len);
-                results.push(row);
-                *all = after;
-            }
+            let mut results: Vec<_> = rest.iter_mut().zip(&lengths).map(|(all, len)| first(all, *len)).collect();
             machine.evaluate_or_interpret(self.output, &arguments, &mut results)?;
         }
         Ok(())
     }
+}
+
+/// Takes the first numbers away from the rest.
+fn first<'a>(rest: &mut &'a mut [f64], n: usize) -> &'a mut [f64] {
+    rest.split_off_mut(..n).unwrap_or_default()
 }
 
 /// The output of a name.

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use multibody::codegen::jit::{CompileError, Compiled, CompiledLanes};
+use multibody::codegen::jit::{CompileError, Compiled};
 use multibody::codegen::model::{Gravity, Model};
 use multibody::codegen::output::{Output, Sizes, FIELDS};
 use multibody::codegen::Options;
@@ -13,6 +13,7 @@ use pyo3::types::PyDict;
 
 use crate::arrays::{batch, Given};
 use crate::contacts::Touching;
+use crate::lanes::AnyLanes;
 
 /// Gravity where it is an input and nobody gives it, m/s²: the default of generated code.
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
@@ -81,9 +82,9 @@ impl Machines {
         self.pool.lock().unwrap_or_else(PoisonError::into_inner).push(machine);
     }
 
-    /// Several states at once, if the model is not too large for that.
-    pub fn lanes(&self) -> Option<CompiledLanes> {
-        self.template.lanes().ok()
+    /// Up to so many states at once, if the model is not too large for that.
+    pub fn lanes(&self, most: usize) -> Option<AnyLanes> {
+        AnyLanes::new(&self.template, most)
     }
 
     /// The mechanism with its contacts, for rollouts.

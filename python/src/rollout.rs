@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use multibody::codegen::jit::{Compiled, CompiledLanes, LANES};
+use multibody::codegen::jit::Compiled;
 use multibody::codegen::output::Output;
 use multibody::runtime::integrate::StepError;
 use multibody::runtime::layout::Layout;
@@ -17,9 +17,9 @@ use crate::contacts::{self, Touching};
 use crate::driver::Driver;
 use crate::drives::{self, Moving};
 use crate::errors::{compile_error, Failed};
+use crate::lanes::{self, AnyLanes};
 use crate::machines::{set, Inputs, Machines};
 use crate::model::Model;
-use crate::pairs;
 use crate::rows::{on_threads, Beat};
 use crate::settings::Settings;
 use crate::told::{self, Asked, Told, Watcher};
@@ -143,7 +143,7 @@ pub struct State {
 /// What a thread works with.
 struct Memory {
     machine: Compiled,
-    lanes: Option<CompiledLanes>,
+    lanes: Option<AnyLanes>,
     touching: Option<Touching>,
 }
 
@@ -160,12 +160,13 @@ impl Motion<'_> {
         (q, v): (&mut [f64], &mut [f64]),
     ) -> PyResult<Vec<(usize, Failed)>> {
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = self.settings.threads.unwrap_or_else(cores).clamp(1, rows.max(1));
         let lanes = match self.at_once(machines, rows) {
-            true => py.detach(|| machines.lanes()),
+            true => py.detach(|| machines.lanes(rows.div_ceil(threads))),
             false => None,
         };
-        let width = if lanes.is_some() { LANES } else { 1 };
-        let threads = self.settings.threads.unwrap_or_else(cores).min(rows.div_ceil(width)).max(1);
+        let width = lanes.as_ref().map_or(1, AnyLanes::width);
+        let threads = threads.min(rows.div_ceil(width)).max(1);
         let failures = Mutex::new(Vec::new());
         py.detach(|| {
             let mut items = cut(q, rows).zip(cut(v, rows)).enumerate().map(|(k, (q, v))| (k, q, v));
@@ -192,23 +193,19 @@ impl Motion<'_> {
     fn at_once(&self, machines: &Machines, rows: usize) -> bool {
         let Settings { method, tolerance, .. } = self.settings;
         let alone = self.touching.is_some() || self.moving.is_some() || !self.asked.functions.is_empty();
-        rows >= LANES && !alone && machines.sizes().rows == 0 && pairs::possible(method, *tolerance)
+        rows > 1 && !alone && machines.sizes().rows == 0 && lanes::possible(method, *tolerance)
     }
 
     /// Computes some rows, at once if possible; returns those that fail.
     fn block(&self, memory: &mut Memory, block: Vec<Item>, beat: &mut Beat) -> Vec<(usize, Failed)> {
-        let left = match (&mut memory.lanes, <[Item; LANES]>::try_from(block)) {
-            (Some(lanes), Ok(mut items)) => {
-                if self.rows_at_once((&mut memory.machine, lanes), &mut items, beat).is_some() {
-                    return Vec::new();
-                }
-                items.into()
+        let mut block = block;
+        if let (Some(lanes), 2..) = (&mut memory.lanes, block.len()) {
+            if self.rows_at_once(&mut memory.machine, lanes, &mut block, beat).is_some() {
+                return Vec::new();
             }
-            (_, Ok(items)) => items.into(),
-            (_, Err(block)) => block,
-        };
+        }
         let one = |item: Item| (item.0, self.row(memory, item, beat));
-        left.into_iter().map(one).filter_map(|(k, done)| Some((k, done.err()?))).collect()
+        block.into_iter().map(one).filter_map(|(k, done)| Some((k, done.err()?))).collect()
     }
 
     /// Refuses quaternions that are not of unit length.

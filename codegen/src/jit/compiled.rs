@@ -7,7 +7,7 @@ use mbd_runtime::tree::row_order::RowProducts;
 use mbd_runtime::Interpreter;
 
 use super::instructions::{width, INPUTS};
-use super::lanes::LanesCode;
+use super::lanes::AllLanes;
 use super::memory::{MachineCode, Number};
 use super::CompileError;
 use crate::code::{compile, Code};
@@ -71,14 +71,14 @@ pub(super) struct Shared<S> {
     outputs: Vec<OnceLock<Result<MachineCode<S>, CompileError>>>,
     coordinate_rates: OnceLock<Result<MachineCode<S>, CompileError>>,
     /// Code for several states at once.
-    pub(super) lanes: OnceLock<Result<LanesCode, CompileError>>,
+    pub(super) lanes: AllLanes,
 }
 
 impl<S: Number> Shared<S> {
     /// Nothing is compiled yet.
     fn new(plan: Plan, options: Options, sizes: Sizes) -> Self {
         let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
-        Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new(), lanes: OnceLock::new() }
+        Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new(), lanes: AllLanes::default() }
     }
 
     /// Compiles a program.
@@ -113,13 +113,13 @@ impl<S: Number> Shared<S> {
     }
 
     /// The code of an output, made when it is first asked for.
-    fn output(&self, output: Output) -> Result<&MachineCode<S>, &CompileError> {
+    pub(super) fn output(&self, output: Output) -> Result<&MachineCode<S>, &CompileError> {
         let make = || self.compiled(output, 1);
         // The list has the order of the enumeration.
         self.outputs[output as usize].get_or_init(make).as_ref()
     }
 
-    fn coordinate_rates(&self) -> Result<&MachineCode<S>, &CompileError> {
+    pub(super) fn coordinate_rates(&self) -> Result<&MachineCode<S>, &CompileError> {
         self.coordinate_rates.get_or_init(|| self.compiled_coordinate_rates(1)).as_ref()
     }
 
@@ -410,5 +410,6 @@ fn call<S: Number>(
     let gravity = if code.reads_gravity() { &gravity[..] } else { &[] };
     let given: [&[S]; INPUTS] =
         [a, b, c, tau, drive_q, drive_v, drive_a, wrenches.as_flattened(), params, acts, gravity];
+    // Code for one state never gives up.
     code.call(&given, results, scratch);
 }

@@ -1,7 +1,7 @@
 //! Single instructions in Cranelift's intermediate language.
 //!
 //! A compiled function takes three addresses: a table with the addresses of the input arrays (three arguments, then
-//! [`FIELDS`], then the function's constants), a table with those of the result arrays, and working memory.
+//! [`FIELDS`], then the function's constants), a table with those of the result arrays, and working memory. It returns 0.
 
 use std::collections::BTreeMap;
 
@@ -93,7 +93,8 @@ pub fn write(function: &mut Function, program: &OutputProgram<Code>, shape: &Sha
     let number = of_lanes(shape.precision, shape.lanes);
     let mut writer = Writer { b, shape, number, inputs, outputs, memory, constants: table, vectors: Vec::new(), sines };
     lower::lower(&mut writer, program, shape.results, shape.spills);
-    writer.b.ins().return_(&[]);
+    let done = writer.b.ins().iconst(types::I32, 0);
+    writer.b.ins().return_(&[done]);
     writer.b.seal_all_blocks();
     writer.b.finalize();
     writer.vectors

@@ -4,12 +4,14 @@
 //! - A function is called only through [`MachineCode::call`], which compares the length of every slice with that of the
 //!   array of which the code was made, times the number of states that it computes at once. The code reads and writes at
 //!   constant places inside these arrays, in tables that the function owns, and in working memory whose length is
-//!   compared too. Tables and working memory begin at multiples of 16 bytes, as aligned loads and stores of vectors want.
+//!   compared too. Tables and working memory begin at multiples of 64 bytes, as aligned loads and stores of vectors want.
 //! - Input slices are shared and result slices are exclusive references, so that the code's loads and stores do not
 //!   meet those of others.
 //! - The memory of the code lives as long as the function and is never changed after it was made, so that any number of
 //!   threads may call it.
 //! - The functions for sines and cosines are called by this code alone, with parts of the working memory.
+//! - Code in vectors of 32 and 64 bytes is made only where the processor has them. It changes no register that belongs
+//!   to its caller.
 #![allow(unsafe_code)]
 
 use std::collections::BTreeMap;
@@ -21,6 +23,7 @@ use cranelift::module::{default_libcall_names, Linkage, Module};
 use cranelift::prelude::*;
 
 use super::instructions::{input_places, width, write, Shape, BLOCK, INPUTS};
+use super::vectors::{self, Width};
 use super::CompileError;
 use crate::code::Code;
 use crate::lower::{is_together, table, Memory, Spills};
@@ -29,10 +32,10 @@ use crate::output::OutputProgram;
 use crate::rolled::RolledProgram;
 use mbd_runtime::kernel::{level, Level};
 use mbd_runtime::system::Real;
-use mbd_runtime::trig;
+use mbd_runtime::{trig, Packed};
 
 /// The most result arrays that a function has.
-const RESULTS: usize = 6;
+pub const RESULTS: usize = 6;
 
 /// Values of straight-line code that are in registers at a time. The processors have 16 or 32 for numbers, of which an
 /// instruction needs one or two more.
@@ -41,8 +44,9 @@ const REGISTERS: usize = 13;
 /// Computes sines and cosines of `n` angles, a multiple of [`BLOCK`].
 type Sines<S> = unsafe extern "C" fn(*const S, usize, *mut S, *mut S);
 
-/// Code of a function: addresses of the input arrays, of the result arrays, and of the working memory.
-type Entry<S> = unsafe extern "C" fn(*const *const S, *const *mut S, *mut S);
+/// Code of a function: addresses of the input arrays, of the result arrays, and of the working memory. It returns 0, or
+/// another number if it gave up.
+type Entry<S> = unsafe extern "C" fn(*const *const S, *const *mut S, *mut S) -> u32;
 
 /// A number type that machine code can compute with: `f64` or `f32`.
 pub trait Number: Real + Default + Send + Sync + 'static + sealed::Sealed {
@@ -116,11 +120,19 @@ pub struct MachineCode<S> {
     constants: Box<[S]>,
 }
 
-/// Entries before the first address that vectors may have.
+/// Tables and working memory begin where lines of the cache do, so that no vector lies in two of them.
+const LINE: usize = 64;
+
+/// The most entries before such an address, and one more.
+const fn padding<S>() -> usize {
+    LINE / size_of::<S>()
+}
+
+/// Entries before the first such address.
 #[inline]
 fn before_aligned<S>(at: *const S) -> usize {
-    // Numbers are aligned to their own size, which divides that of a vector.
-    (at as usize).wrapping_neg() % 16 / size_of::<S>()
+    // Numbers are aligned to their own size, which divides that of a line.
+    (at as usize).wrapping_neg() % LINE / size_of::<S>()
 }
 
 // SAFETY: the module is not touched before it is dropped, and the code has no state of its own.
@@ -130,7 +142,7 @@ unsafe impl<S> Sync for MachineCode<S> {}
 
 impl<S: Number> MachineCode<S> {
     /// Compiles a program whose results fill arrays of the lengths `results`, for one state or for `lanes` states at once:
-    /// as many as a vector of 16 bytes has numbers. All arrays then have that many numbers side by side for each entry.
+    /// two, or as many as [`Width::of_lanes`] knows. All arrays then have that many numbers side by side for each entry.
     ///
     /// # Errors
     /// [`CompileError::Machine`] with Cranelift's words.
@@ -141,57 +153,66 @@ impl<S: Number> MachineCode<S> {
         lanes: usize,
     ) -> Result<Self, CompileError> {
         let fast = arithmetic == Arithmetic::Fast;
+        let fused = fast && level() > Level::Plain;
         let mut module = compiler(&program.program)?;
-        let (address, call) = (module.target_config().pointer_type(), module.target_config().default_call_conv);
-        let signature = |parameters: usize| {
-            let mut signature = Signature::new(call);
-            signature.params = vec![AbiParam::new(address); parameters];
-            signature
-        };
-        let constants: BTreeMap<u64, usize> =
-            program.program.constants().into_iter().enumerate().map(|(at, bits)| (bits, at)).collect();
-        let width = width(S::PRECISION, lanes);
-        let mut numbers: Vec<f64> = constants.keys().map(|bits| f64::from_bits(*bits)).collect();
-        let mut tables = Vec::new();
-        let lanes_of_vector = 16 / S::PRECISION.bytes();
-        let align = |numbers: &mut Vec<f64>| numbers.resize(numbers.len().next_multiple_of(lanes_of_vector), 0.0);
-        align(&mut numbers);
-        if let Code::Rolled(rolled) = &program.program {
-            let together = is_together(rolled, width).then_some(width);
-            for run in &rolled.loops {
-                tables.push(numbers.len());
-                numbers.extend(table(run, together));
-            }
-        }
-        align(&mut numbers);
-        let spills = Spills::of(&program.program, REGISTERS, width);
-        let memory = Memory::new(&program.program, &spills, BLOCK, width);
-        let shape = Shape {
-            precision: S::PRECISION,
-            lanes,
-            address,
-            fused: fast && level() > Level::Plain,
-            results: &results,
-            memory: &memory,
-            spills: &spills,
-            constants: &constants,
-            tables: &tables,
-            vectors: numbers.len(),
-            sines: (signature(4), S::SINES[usize::from(fast)] as usize),
-        };
-        let id = module.declare_function(program.spec.name, Linkage::Local, &signature(3));
+        let mut signature = of_addresses(&module, 3);
+        signature.returns.push(AbiParam::new(types::I32));
+        let id = module.declare_function(program.spec.name, Linkage::Local, &signature);
         let id = id.map_err(CompileError::machine)?;
-        let mut function = Function::with_name_signature(UserFuncName::user(0, id.as_u32()), signature(3));
-        let vectors = write(&mut function, program, &shape);
-        numbers.extend(vectors.iter().flat_map(|bits| vec![f64::from_bits(*bits); lanes_of_vector]));
-        let mut constants = vec![S::zero(); lanes_of_vector + numbers.len()].into_boxed_slice();
+        let body = match Width::of_lanes(lanes) {
+            Some(width) => {
+                let written = vectors::compile(program, &results, fused, width)
+                    .ok_or_else(|| CompileError::machine("the code is too long for vectors"))?;
+                module.define_function_bytes(id, 64, &written.bytes, &[]).map_err(CompileError::machine)?;
+                Body { scratch: written.scratch, size: written.bytes.len(), numbers: written.numbers }
+            }
+            None => {
+                let constants: BTreeMap<u64, usize> =
+                    program.program.constants().into_iter().enumerate().map(|(at, bits)| (bits, at)).collect();
+                let width = width(S::PRECISION, lanes);
+                let mut numbers: Vec<f64> = constants.keys().map(|bits| f64::from_bits(*bits)).collect();
+                let mut tables = Vec::new();
+                let lanes_of_vector = 16 / S::PRECISION.bytes();
+                let align =
+                    |numbers: &mut Vec<f64>| numbers.resize(numbers.len().next_multiple_of(lanes_of_vector), 0.0);
+                align(&mut numbers);
+                if let Code::Rolled(rolled) = &program.program {
+                    let together = is_together(rolled, width).then_some(width);
+                    for run in &rolled.loops {
+                        tables.push(numbers.len());
+                        numbers.extend(table(run, together));
+                    }
+                }
+                align(&mut numbers);
+                let spills = Spills::of(&program.program, REGISTERS, width);
+                let memory = Memory::new(&program.program, &spills, BLOCK, width);
+                let shape = Shape {
+                    precision: S::PRECISION,
+                    lanes,
+                    address: module.target_config().pointer_type(),
+                    fused,
+                    results: &results,
+                    memory: &memory,
+                    spills: &spills,
+                    constants: &constants,
+                    tables: &tables,
+                    vectors: numbers.len(),
+                    sines: (of_addresses(&module, 4), S::SINES[usize::from(fast)] as usize),
+                };
+                let mut function = Function::with_name_signature(UserFuncName::user(0, id.as_u32()), signature);
+                let vectors = write(&mut function, program, &shape);
+                numbers.extend(vectors.iter().flat_map(|bits| vec![f64::from_bits(*bits); lanes_of_vector]));
+                let mut context = Context::for_function(function);
+                module.define_function(id, &mut context).map_err(CompileError::machine)?;
+                let size = context.compiled_code().map_or(0, |code| code.code_info().total_size as usize);
+                Body { scratch: memory.len(), size, numbers }
+            }
+        };
+        let mut constants = vec![S::zero(); padding::<S>() + body.numbers.len()].into_boxed_slice();
         let first = before_aligned(constants.as_ptr());
-        for (to, from) in constants[first..].iter_mut().zip(numbers) {
+        for (to, from) in constants[first..].iter_mut().zip(body.numbers) {
             *to = S::constant(from);
         }
-        let mut context = Context::for_function(function);
-        module.define_function(id, &mut context).map_err(CompileError::machine)?;
-        let size = context.compiled_code().map_or(0, |code| code.code_info().total_size as usize);
         module.finalize_definitions().map_err(CompileError::machine)?;
         let code = module.get_finalized_function(id);
         // SAFETY: the function was made with this signature, for the calling convention of the host.
@@ -208,8 +229,8 @@ impl<S: Number> MachineCode<S> {
             entry,
             inputs,
             results,
-            scratch: lanes * memory.len() + lanes_of_vector,
-            size,
+            scratch: lanes * body.scratch + padding::<S>(),
+            size: body.size,
             constants,
         })
     }
@@ -230,12 +251,13 @@ impl<S: Number> MachineCode<S> {
         self.inputs[INPUTS - 1] > 0
     }
 
-    /// Runs the code. `inputs` are the arguments, then the fields.
+    /// Runs the code. `inputs` are the arguments, then the fields. Returns whether it computed the results: code in vectors
+    /// of more than 16 bytes gives up where an angle is beyond the range of the main path of sine and cosine.
     ///
     /// # Panics
     /// If a slice has another length than its array, or the working memory is too short.
     #[inline]
-    pub fn call(&self, inputs: &[&[S]; INPUTS], results: &mut [&mut [S]], scratch: &mut [S]) {
+    pub fn call(&self, inputs: &[&[S]; INPUTS], results: &mut [&mut [S]], scratch: &mut [S]) -> bool {
         assert!(scratch.len() >= self.scratch, "the working memory is too short");
         // Differences are collected without a branch.
         let other = inputs.iter().zip(&self.inputs).fold(0, |all, (input, len)| all | (input.len() ^ len));
@@ -256,8 +278,35 @@ impl<S: Number> MachineCode<S> {
         let skipped = before_aligned(scratch.as_ptr());
         let scratch = &mut scratch[skipped..];
         // SAFETY: see the head of this file.
-        unsafe { (self.entry)(read.as_ptr(), written.as_ptr(), scratch.as_mut_ptr()) }
+        unsafe { (self.entry)(read.as_ptr(), written.as_ptr(), scratch.as_mut_ptr()) == 0 }
     }
+}
+
+/// Numbers of several states as they are in memory.
+pub fn numbers<const L: usize>(x: &[Packed<L>]) -> &[f64] {
+    // SAFETY: `Packed<L>` is `[f64; L]` in memory (`repr(transparent)`).
+    unsafe { std::slice::from_raw_parts(x.as_ptr().cast(), L * x.len()) }
+}
+
+/// The same, to be written.
+pub fn numbers_mut<const L: usize>(x: &mut [Packed<L>]) -> &mut [f64] {
+    // SAFETY: the same.
+    unsafe { std::slice::from_raw_parts_mut(x.as_mut_ptr().cast(), L * x.len()) }
+}
+
+/// What the body of a function needs: entries of working memory, constants and tables; and its length, bytes.
+struct Body {
+    scratch: usize,
+    size: usize,
+    numbers: Vec<f64>,
+}
+
+/// The signature of a function of so many addresses.
+fn of_addresses(module: &JITModule, parameters: usize) -> Signature {
+    let target = module.target_config();
+    let mut signature = Signature::new(target.default_call_conv);
+    signature.params = vec![AbiParam::new(target.pointer_type()); parameters];
+    signature
 }
 
 /// A compiler for some code on this processor.

@@ -30,9 +30,10 @@ mod interpreted;
 mod lanes;
 mod memory;
 mod traits;
+mod vectors;
 
 pub use compiled::Compiled;
 pub use drives::{Drives, SampledDrives};
 pub use error::CompileError;
-pub use lanes::{CompiledLanes, LANES};
+pub use lanes::{best_lanes, CompiledLanes};
 pub use memory::Number;

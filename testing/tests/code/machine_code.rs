@@ -5,12 +5,14 @@
 
 use std::collections::BTreeSet;
 
-use mbd_codegen::jit::{CompileError, Compiled, Number};
+use mbd_codegen::jit::{best_lanes, CompileError, Compiled, Number};
 use mbd_codegen::model::Model;
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::{search, Arithmetic, Options, Output, Precision, RolledCode};
-use mbd_runtime::{Accelerated, Conjugate, Constrained, Differentiable, Energetic, Interpreter, System};
+use mbd_runtime::{
+    Accelerated, Conjugate, Constrained, Differentiable, Energetic, Interpreter, Packed, Scalar, System,
+};
 use mbd_testing::closed::{random_loops, LoopKnobs};
 use mbd_testing::conformance::{chain, closed, exact, sampled, tree, Case};
 use mbd_testing::random::{random_model, Distribution};
@@ -51,13 +53,49 @@ fn compare<S: Number>(case: &Case) -> usize {
     rolled
 }
 
+/// The same of as many states at once as a vector of some length has doubles.
+fn compare_lanes<const L: usize>(case: &Case) {
+    let machine = compiled::<f64>(&case.plan, &case.options, &case.state);
+    let mut lanes = match machine.lanes::<L>() {
+        Err(CompileError::TooLarge { .. }) => return,
+        lanes => lanes.unwrap_or_else(|e| panic!("{}: {e}", case.name)),
+    };
+    for run in case.runs() {
+        let packed = |array: &[f64]| -> Vec<Packed<L>> { array.iter().map(|x| Packed::constant(*x)).collect() };
+        let given: Vec<Vec<Packed<L>>> = run.arrays().into_iter().map(packed).collect();
+        let arguments = given.iter().zip(&run.inputs).filter(|(_, array)| !array.field);
+        let arguments: Vec<&[Packed<L>]> = arguments.map(|(given, _)| &given[..]).collect();
+        let mut found: Vec<Vec<Packed<L>>> =
+            run.lengths.iter().map(|len| vec![Packed::constant(f64::NAN); *len]).collect();
+        let mut results: Vec<&mut [Packed<L>]> = found.iter_mut().map(Vec::as_mut_slice).collect();
+        match lanes.evaluate(run.output, &arguments, &mut results) {
+            Err(CompileError::TooLarge { .. }) => continue,
+            result => result.unwrap_or_else(|e| panic!("{}: {:?}: {e}", case.name, run.output)),
+        }
+        let found = found.concat();
+        for lane in 0..L {
+            let found: Vec<f64> = found.iter().map(|x| x.0[lane]).collect();
+            let whose = format!("{}, lane {lane} of {L}\n{}", case.name, to_toml(&case.plan.model));
+            run.check(&whose, &found);
+        }
+    }
+}
+
 /// Compares the cases of some seeds. Returns the number of outputs that are rolled, each seed counted once.
 fn compare_all(case: fn(u64) -> Case, seeds: u64) -> usize {
     let names: BTreeSet<String> = (0..seeds).map(|seed| case(seed).name).collect();
     let mut all = 0;
     for case in sampled(case, seeds) {
         let rolled = match case.options.precision {
-            Precision::F64 => compare::<f64>(&case),
+            Precision::F64 => {
+                if best_lanes() >= 4 {
+                    compare_lanes::<4>(&case);
+                }
+                if best_lanes() >= 8 {
+                    compare_lanes::<8>(&case);
+                }
+                compare::<f64>(&case)
+            }
             Precision::F32 => compare::<f32>(&case),
         };
         all += if names.contains(&case.name) { rolled } else { 0 };

@@ -1,0 +1,297 @@
+//! The body of a function as a list of vector instructions over any number of values.
+
+use crate::lower::{limit, main_path, Array, Instructions, Operation, Place};
+use crate::options::Precision;
+
+/// Number of a value, in the order in which values come.
+pub type Id = u32;
+
+/// An array of a loop's turn: entry of turn 0, and by how many entries it moves from turn to turn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    pub array: Array,
+    pub at: usize,
+    pub stride: usize,
+}
+
+/// Instructions of two operands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Binary {
+    Add,
+    Sub,
+    Mul,
+    Div,
+    And,
+    Or,
+    Xor,
+    /// Of integers.
+    AddIntegers,
+    /// Of integers.
+    SubIntegers,
+}
+
+/// How a value is computed.
+#[derive(Clone, Copy, Debug)]
+pub enum Step {
+    /// A constant by its bits.
+    Constant(u64),
+    Load(Entry),
+    Binary(Binary, Id, Id),
+    /// `±a · b ± c`
+    Fused {
+        a: Id,
+        b: Id,
+        c: Id,
+        minus_product: bool,
+        minus_addend: bool,
+    },
+    Sqrt(Id),
+    /// Shifted to the left, as an integer.
+    Shift(Id, u8),
+    /// `yes` where the sign of the mask is set, otherwise `no`.
+    Select {
+        mask: Id,
+        yes: Id,
+        no: Id,
+    },
+    /// `x`, or 0 where `value <= floor`.
+    ZeroBelow {
+        value: Id,
+        floor: Id,
+        x: Id,
+    },
+}
+
+impl Step {
+    /// The values that are read.
+    pub fn operands(&self) -> impl Iterator<Item = Id> {
+        let operands = match *self {
+            Step::Constant(_) | Step::Load(_) => [None; 3],
+            Step::Binary(_, a, b) => [Some(a), Some(b), None],
+            Step::Fused { a, b, c, .. } => [Some(a), Some(b), Some(c)],
+            Step::Sqrt(a) | Step::Shift(a, _) => [Some(a), None, None],
+            Step::Select { mask, yes, no } => [Some(mask), Some(yes), Some(no)],
+            Step::ZeroBelow { value, floor, x } => [Some(value), Some(floor), Some(x)],
+        };
+        operands.into_iter().flatten()
+    }
+}
+
+/// A part of the body.
+#[derive(Clone, Copy, Debug)]
+pub enum Item {
+    /// Computes the value of that number.
+    Value(Id, Step),
+    Store(Entry, Id),
+    /// The function gives up if the sign of a lane is set.
+    ExitIfSigns(Id),
+    /// A loop of so many turns begins. No value is read on its other side.
+    Open {
+        turns: usize,
+        backward: bool,
+    },
+    /// It ends.
+    Close {
+        turns: usize,
+        backward: bool,
+    },
+}
+
+/// A value as the program has it: the negative of one that is computed costs nothing where it can be a part of what
+/// reads it.
+#[derive(Clone, Copy, Debug)]
+pub struct Signed {
+    id: Id,
+    minus: bool,
+}
+
+/// A body that is being recorded.
+pub struct Body {
+    pub items: Vec<Item>,
+    pub values: Id,
+    /// Number of places for the values that loops carry from turn to turn.
+    pub carried: usize,
+    fused: bool,
+}
+
+/// A loop that is being recorded: first place of what it carries.
+pub struct Loop {
+    turns: usize,
+    backward: bool,
+    carried: usize,
+}
+
+impl Body {
+    pub fn new(fused: bool) -> Body {
+        Body { items: Vec::new(), values: 0, carried: 0, fused }
+    }
+
+    fn value(&mut self, step: Step) -> Id {
+        self.items.push(Item::Value(self.values, step));
+        self.values += 1;
+        self.values - 1
+    }
+
+    fn constant_bits(&mut self, bits: u64) -> Id {
+        self.value(Step::Constant(bits))
+    }
+
+    fn binary(&mut self, operation: Binary, a: Id, b: Id) -> Id {
+        self.value(Step::Binary(operation, a, b))
+    }
+
+    /// The value itself.
+    fn plain(&mut self, Signed { id, minus }: Signed) -> Id {
+        if !minus {
+            return id;
+        }
+        let sign = self.constant_bits(SIGN);
+        self.binary(Binary::Xor, id, sign)
+    }
+
+    fn sum(&mut self, a: Signed, b: Signed) -> Signed {
+        let (id, minus) = match (a.minus, b.minus) {
+            (false, true) => (self.binary(Binary::Sub, a.id, b.id), false),
+            (true, false) => (self.binary(Binary::Sub, b.id, a.id), false),
+            (both, _) => (self.binary(Binary::Add, a.id, b.id), both),
+        };
+        Signed { id, minus }
+    }
+
+    fn product(&mut self, operation: Binary, a: Signed, b: Signed) -> Signed {
+        Signed { id: self.binary(operation, a.id, b.id), minus: a.minus != b.minus }
+    }
+
+    /// Sines and cosines of angles, which all have to be within the range of the main path.
+    fn pairs(&mut self, angles: &[Signed]) -> Vec<[Signed; 2]> {
+        let (size, limit) = (!SIGN, limit(Precision::F64).to_bits());
+        // The bits of doubles without signs have the order of the numbers, and NaN comes last.
+        let mut beyond = None;
+        for angle in angles {
+            let (size, limit) = (self.constant_bits(size), self.constant_bits(limit));
+            let size = self.binary(Binary::And, angle.id, size);
+            let rest = self.binary(Binary::SubIntegers, limit, size);
+            beyond = Some(beyond.map_or(rest, |beyond| self.binary(Binary::Or, beyond, rest)));
+        }
+        self.items.extend(beyond.map(Item::ExitIfSigns));
+        let fused = self.fused;
+        let pair = |angle: &Signed| main_path(self, *angle, Precision::F64, fused, Body::turned);
+        angles.iter().map(pair).collect()
+    }
+
+    /// Exchanges sine and cosine in odd quadrants and gives them the quadrant's signs, by their bits.
+    fn turned(&mut self, [quadrant, _]: [Signed; 2], pair: [Signed; 2]) -> [Signed; 2] {
+        let quadrant = self.plain(quadrant);
+        let [sin, cos] = pair.map(|x| self.plain(x));
+        let odd = self.value(Step::Shift(quadrant, 63));
+        let one = self.constant_bits(1);
+        let next = self.binary(Binary::AddIntegers, quadrant, one);
+        [(quadrant, cos, sin), (next, sin, cos)].map(|(quadrant, yes, no)| {
+            let turned = self.value(Step::Select { mask: odd, yes, no });
+            // Bit 1 becomes the sign.
+            let high = self.value(Step::Shift(quadrant, 62));
+            let sign = self.constant_bits(SIGN);
+            let sign = self.binary(Binary::And, high, sign);
+            Signed { id: self.binary(Binary::Xor, turned, sign), minus: false }
+        })
+    }
+
+    fn entry(place: Place<()>) -> Entry {
+        Entry { array: place.array, at: place.at, stride: place.turn.map_or(0, |(_, stride)| stride) }
+    }
+
+    /// A place of what loops carry. Nothing else asks for this array, because it is decided later what leaves the registers.
+    fn carried(slot: usize) -> Entry {
+        Entry { array: Array::Spilled, at: slot, stride: 0 }
+    }
+}
+
+/// The bit of the sign.
+const SIGN: u64 = 1 << 63;
+
+impl Instructions for Body {
+    type Value = Signed;
+    type Turn = ();
+    type Loop = Loop;
+
+    fn constant(&mut self, x: f64) -> Signed {
+        Signed { id: self.constant_bits(x.to_bits()), minus: false }
+    }
+
+    fn load(&mut self, place: Place<()>) -> Signed {
+        Signed { id: self.value(Step::Load(Body::entry(place))), minus: false }
+    }
+
+    fn store(&mut self, place: Place<()>, value: Signed) {
+        let value = self.plain(value);
+        self.items.push(Item::Store(Body::entry(place), value));
+    }
+
+    fn operation(&mut self, operation: Operation<Signed>) -> Signed {
+        match operation {
+            Operation::Add(a, b) => self.sum(a, b),
+            Operation::Sub(a, b) => self.sum(a, Signed { minus: !b.minus, ..b }),
+            Operation::Mul(a, b) => self.product(Binary::Mul, a, b),
+            Operation::Div(a, b) => self.product(Binary::Div, a, b),
+            Operation::Fma(a, b, c) if self.fused => {
+                let (minus_product, minus_addend) = (a.minus != b.minus, c.minus);
+                let step = Step::Fused { a: a.id, b: b.id, c: c.id, minus_product, minus_addend };
+                Signed { id: self.value(step), minus: false }
+            }
+            Operation::Fma(a, b, c) => {
+                let product = self.product(Binary::Mul, a, b);
+                self.sum(product, c)
+            }
+            Operation::Negate(a) => Signed { minus: !a.minus, ..a },
+            Operation::ReciprocalAbove { value, floor } => {
+                let one = self.constant_bits(1_f64.to_bits());
+                let [value, floor] = [value, floor].map(|x| self.plain(x));
+                let x = self.binary(Binary::Div, one, value);
+                Signed { id: self.value(Step::ZeroBelow { value, floor, x }), minus: false }
+            }
+            Operation::Sqrt(a) => {
+                let a = self.plain(a);
+                Signed { id: self.value(Step::Sqrt(a)), minus: false }
+            }
+        }
+    }
+
+    fn sines(&mut self, angles: &[Signed]) -> Vec<[Signed; 2]> {
+        let angles: Vec<Signed> = angles.iter().map(|a| Signed { id: self.plain(*a), minus: false }).collect();
+        self.pairs(&angles)
+    }
+
+    fn sines_of_array(&mut self, n: usize) {
+        let (open, (), _) = self.open_loop(n, false, Vec::new());
+        let angle = self.load(Place::moving(Array::Angles, 0, (), 1));
+        for ([sin, cos], arrays) in self.pairs(&[angle]).into_iter().zip([[Array::Sines, Array::Cosines]]) {
+            self.store(Place::moving(arrays[0], 0, (), 1), sin);
+            self.store(Place::moving(arrays[1], 0, (), 1), cos);
+        }
+        self.close_loop(open, Vec::new());
+    }
+
+    fn open_loop(&mut self, turns: usize, backward: bool, start: Vec<Signed>) -> (Loop, (), Vec<Signed>) {
+        let (carried, n) = (self.carried, start.len());
+        self.carried += n;
+        for (slot, value) in start.into_iter().enumerate() {
+            let value = self.plain(value);
+            self.items.push(Item::Store(Body::carried(carried + slot), value));
+        }
+        self.items.push(Item::Open { turns, backward });
+        let load = |slot| Signed { id: self.value(Step::Load(Body::carried(carried + slot))), minus: false };
+        let values = (0..n).map(load).collect();
+        (Loop { turns, backward, carried }, (), values)
+    }
+
+    fn close_loop(&mut self, Loop { turns, backward, carried }: Loop, next: Vec<Signed>) -> Vec<Signed> {
+        let n = next.len();
+        let next: Vec<Id> = next.into_iter().map(|value| self.plain(value)).collect();
+        for (slot, value) in next.into_iter().enumerate() {
+            self.items.push(Item::Store(Body::carried(carried + slot), value));
+        }
+        self.items.push(Item::Close { turns, backward });
+        let load = |slot| Signed { id: self.value(Step::Load(Body::carried(carried + slot))), minus: false };
+        (0..n).map(load).collect()
+    }
+}
