@@ -317,8 +317,11 @@ mod tests {
         Last::Memory(Address { base, index: Some(General::R10), offset, broadcast: false })
     }
 
+    /// Bytes, and what writes them.
+    type Case<'a> = (&'a str, &'a dyn Fn(&mut Assembler));
+
     /// Bytes of some instructions, those of GNU as 2.40.
-    fn compare(width: Width, cases: &[(&str, &dyn Fn(&mut Assembler))]) {
+    fn compare(width: Width, cases: &[Case]) {
         for (bytes, write) in cases {
             let mut assembler = Assembler::new(width);
             write(&mut assembler);

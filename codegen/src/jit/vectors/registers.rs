@@ -281,7 +281,7 @@ impl Writer<'_> {
         // Factors and addend in the order in which they are best replaced.
         let dies = |id: Id| self.next_use_after_now(id).is_none();
         let candidates = [2, 0, 1].into_iter().filter(|k| memory != Some(operands[*k]));
-        let replaced = candidates.clone().find(|k| dies(operands[*k])).or_else(|| candidates.clone().last())?;
+        let replaced = candidates.clone().find(|k| dies(operands[*k])).or_else(|| candidates.clone().next_back())?;
         let mut first = registers[replaced];
         if !dies(operands[replaced]) {
             let to = self.register(&keep)?;
