@@ -60,11 +60,11 @@ static inline void double_pendulum_quadrant(
     const double t5 = -t4;
     const double t6 = t0 * t0;
     const double t7 = t0 * t6;
-    const double t8 = t0 * 1.58969099521155e-10 - 2.5050760253406863e-8;
-    const double t9 = t0 * 2.7557313707070068e-6 - 0.0001984126982985795;
-    const double t10 = t0 * t9 + 0.00833333333332249;
+    const double t8 = 1.58969099521155e-10 * t0 - 2.5050760253406863e-8;
+    const double t9 = 2.7557313707070068e-6 * t0 - 0.0001984126982985795;
+    const double t10 = t9 * t0 + 0.00833333333332249;
     const double t11 = t7 * t8 + t10;
-    const double t12 = t0 * t11 - 0.16666666666666632;
+    const double t12 = t11 * t0 - 0.16666666666666632;
     const double t13 = t5 * t12 + t3;
     const double t14 = y0 - t13;
     const double t15 = 1.0 - t1;
@@ -73,10 +73,10 @@ static inline void double_pendulum_quadrant(
     const double t18 = t0 * t0;
     const double t19 = t0 * t0;
     const double t20 = t18 * t19;
-    const double t21 = t0 * -1.1359647557788195e-11 + 2.087572321298175e-9;
-    const double t22 = t0 * t21 - 2.7557314351390663e-7;
-    const double t23 = t0 * 2.480158728947673e-5 - 0.001388888888887411;
-    const double t24 = t0 * t23 + 0.0416666666666666;
+    const double t21 = -1.1359647557788195e-11 * t0 + 2.087572321298175e-9;
+    const double t22 = t21 * t0 - 2.7557314351390663e-7;
+    const double t23 = 2.480158728947673e-5 * t0 - 0.001388888888887411;
+    const double t24 = t23 * t0 + 0.0416666666666666;
     const double t25 = t0 * t24;
     const double t26 = t20 * t22 + t25;
     const double t27 = y0 * y1;
@@ -102,7 +102,7 @@ static inline void double_pendulum_quadrant(
 static inline void double_pendulum_near(double x, double *restrict sine, double *restrict cosine)
 {
 #ifdef DOUBLE_PENDULUM_FMA
-    const double t0 = DOUBLE_PENDULUM_FMA(x, 0.6366197723675814, 6755399441055744.0);
+    const double t0 = DOUBLE_PENDULUM_FMA(0.6366197723675814, x, 6755399441055744.0);
     const double t1 = t0 - 6755399441055744.0;
     const double t2 = -t1;
     const double t3 = DOUBLE_PENDULUM_FMA(t2, 1.5707963267948966, x);
@@ -116,7 +116,7 @@ static inline void double_pendulum_near(double x, double *restrict sine, double 
     shifted.number = t0;
     double_pendulum_quadrant(t5, t9, shifted.bits, sine, cosine);
 #else
-    const double t0 = x * 0.6366197723675814 + 6755399441055744.0;
+    const double t0 = 0.6366197723675814 * x + 6755399441055744.0;
     const double t1 = t0 - 6755399441055744.0;
     const double t2 = t1 * 1.5707963267341256;
     const double t3 = x - t2;
