@@ -554,7 +554,7 @@ fn long_run() {
     }
 }
 
-/// No step allocates, with any stabilisation.
+/// No step but the first allocates, with any stabilisation: at the first one the order of the rows is looked at.
 #[test]
 fn nothing_is_allocated() {
     let (mut y, start) = crank("type = \"revolute\"\naxis = [0, 1, 0]");
@@ -564,8 +564,9 @@ fn nothing_is_allocated() {
         M: Stepper<Y>,
     {
         let (mut q, mut p) = start.clone();
+        method.step(y, 0.0, 1e-3, &mut q, &mut p).unwrap();
         let found = allocation_counter::measure(|| {
-            for k in 0..1500 {
+            for k in 1..1500 {
                 method.step(y, f64::from(k) * 1e-3, 1e-3, &mut q, &mut p).unwrap();
             }
         });

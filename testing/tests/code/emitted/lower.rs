@@ -164,17 +164,32 @@ impl<'a> Lowering<'a> {
                 let [Word(at), Word(","), Word("&"), Word(from), Square(k)] = &result[..] else {
                     panic!("unexpected result {result:?}")
                 };
-                let [Word(k)] = k[..] else { panic!("unexpected index {k:?}") };
-                let [to, from] = [to, from].map(|name| self.known(name));
-                assert!(self.function.arrays[to].1 == Role::Written, "{:?} is not written", self.function.arrays[to].0);
-                let given = self.given.entry(to).or_default();
-                assert_eq!(index(at), *given, "results are written in order");
-                *given += 1;
-                Step::Give(to, from, self.within(from, index(k)))
+                self.give(to, index(at), from, k)
+            }
+            // qd.give_pair(0, [&results[4], &results[5]]);
+            [Word(to), Word("."), Word("give_pair"), Round(result)] => {
+                let [Word(at), Word(","), Square(pair)] = &result[..] else { panic!("unexpected results {result:?}") };
+                let [Word("&"), Word(one), Square(j), Word(","), Word("&"), Word(two), Square(k)] = &pair[..] else {
+                    panic!("unexpected pair {pair:?}")
+                };
+                let first = self.give(to, index(at), one, j);
+                self.function.steps.push(first);
+                self.give(to, index(at) + 1, two, k)
             }
             other => panic!("unexpected statement {other:?}"),
         };
         self.function.steps.push(step);
+    }
+
+    /// A result is written: number `at` of the array `to`, from a row of the array `from`.
+    fn give(&mut self, to: &'a str, at: usize, from: &'a str, row: &[Tree<'a>]) -> Step {
+        let [Word(row)] = row else { panic!("unexpected index {row:?}") };
+        let [to, from] = [to, from].map(|name| self.known(name));
+        assert!(self.function.arrays[to].1 == Role::Written, "{:?} is not written", self.function.arrays[to].0);
+        let given = self.given.entry(to).or_default();
+        assert_eq!(at, *given, "results are written in order");
+        *given += 1;
+        Step::Give(to, from, self.within(from, index(row)))
     }
 
     fn all_sines(&mut self, names: [&'a str; 2], types: &[Tree<'a>], of: &[Tree<'a>]) -> Step {
