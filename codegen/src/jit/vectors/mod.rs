@@ -2,7 +2,7 @@
 //!
 //! Cranelift has vectors of 16 bytes only. The bodies of the generator's programs need some twenty instructions and have
 //! no branches but those of counted loops, so that they are written here directly: [`body`] records what
-//! [`lower`](crate::lower) tells, [`registers`] gives it registers, [`encode`] writes the bytes.
+//! [`lower`](crate::lower) tells, [`registers`] gives its values registers, [`encode`] writes the bytes.
 //!
 //! A function gives up (it returns 1) where an angle is beyond the range of the main path of sine and cosine; its caller
 //! then computes the states one by one.

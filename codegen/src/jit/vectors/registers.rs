@@ -3,15 +3,14 @@
 //! The value whose next use is the farthest leaves the registers (Belady, 1966). Constants, inputs and tables are read
 //! again from where they are; other values are stored once. The last operand of an instruction may be in memory.
 
+mod places;
+
 use std::collections::BTreeMap;
 
 use super::body::{Binary, Body, Entry, Id, Item, Step};
-use super::encode::{self as code, fused, Address, Assembler, General, Label, Last, Order, Register};
+use super::encode::{self as code, fused, Assembler, General, Label, Last, Order, Register};
 use super::Width;
 use crate::lower::{Array, Memory};
-
-/// A value that is used again within so many instructions is read into a register.
-const SOON: usize = 12;
 
 /// Registers for addresses of arrays.
 const POINTERS: [General; 4] = [General::Rax, General::Rcx, General::R8, General::R9];
@@ -62,6 +61,7 @@ enum Pointer {
     Numbers,
 }
 
+/// A body that is being written.
 struct Writer<'a> {
     assembler: Assembler,
     width: Width,
@@ -308,192 +308,4 @@ impl Writer<'_> {
         self.hold(id, first);
         Some(())
     }
-
-    /// The next item after this one that uses a value.
-    fn next_use_after_now(&self, id: Id) -> Option<usize> {
-        self.known[id as usize].uses.iter().rev().copied().find(|k| *k > self.now)
-    }
-
-    fn soon(&self, id: Id) -> bool {
-        self.next_use_after_now(id).is_some_and(|k| k <= self.now + SOON)
-    }
-
-    /// Whether an instruction can read the value from memory.
-    fn readable(&self, id: Id) -> bool {
-        let table = matches!(self.known[id as usize].source, Some(Step::Load(Entry { array: Array::Table(_), .. })));
-        self.width == Width::Eight || !table
-    }
-
-    /// The value as the last operand of an instruction.
-    fn last(&mut self, id: Id, keep: &[Register]) -> Option<Last> {
-        if let Some(register) = self.known[id as usize].register {
-            return Some(Last::Register(register));
-        }
-        match self.soon(id) || !self.readable(id) {
-            true => self.in_register(id, keep).map(Last::Register),
-            false => self.memory(id).map(Last::Memory),
-        }
-    }
-
-    fn all_in_registers(&mut self, ids: [Id; 3]) -> Option<[Register; 3]> {
-        let mut keep: Vec<Register> = ids.iter().filter_map(|id| self.known[*id as usize].register).collect();
-        let mut registers = [0; 3];
-        for (register, id) in registers.iter_mut().zip(ids) {
-            *register = self.in_register(id, &keep)?;
-            keep.push(*register);
-        }
-        Some(registers)
-    }
-
-    /// The register of a value, which is read if it has none.
-    fn in_register(&mut self, id: Id, keep: &[Register]) -> Option<Register> {
-        if let Some(register) = self.known[id as usize].register {
-            return Some(register);
-        }
-        let address = self.memory(id)?;
-        let to = self.register(keep)?;
-        match address.broadcast {
-            true => self.assembler.broadcast(to, address),
-            false => self.assembler.vector(code::LOAD, to, None, Last::Memory(address)),
-        }
-        self.hold(id, to);
-        Some(to)
-    }
-
-    fn hold(&mut self, id: Id, register: Register) {
-        self.held[register as usize] = Some(id);
-        self.known[id as usize].register = Some(register);
-    }
-
-    /// Operands are used by the current item; those that are not used again leave their registers, of which one is chosen
-    /// for the result.
-    fn result<const N: usize>(&mut self, operands: [Id; N]) -> Option<Register> {
-        self.used(operands);
-        self.register(&[])
-    }
-
-    fn used<const N: usize>(&mut self, operands: [Id; N]) {
-        for id in operands {
-            let known = &mut self.known[id as usize];
-            while known.uses.last().is_some_and(|k| *k <= self.now) {
-                known.uses.pop();
-            }
-            if known.uses.is_empty() {
-                if let Some(register) = known.register.take() {
-                    self.held[register as usize] = None;
-                }
-            }
-        }
-    }
-
-    /// Places of operands that are not used again become free.
-    fn forget_slots(&mut self, operands: impl IntoIterator<Item = Id>) {
-        for id in operands {
-            let known = &mut self.known[id as usize];
-            if known.uses.is_empty() {
-                self.free_slots.extend(known.slot.take());
-            }
-        }
-    }
-
-    /// A register that is free, or becomes free: not one of `keep`.
-    fn register(&mut self, keep: &[Register]) -> Option<Register> {
-        if let Some(free) = self.held.iter().position(Option::is_none) {
-            return Some(free as Register);
-        }
-        let distance = |register: &usize| {
-            let id = self.held[*register]?;
-            let Known { uses, slot, source, .. } = &self.known[id as usize];
-            // A value that need not be stored may be needed twice as soon.
-            let there = usize::from(slot.is_some() || source.is_some());
-            Some((uses.last()? - self.now) << there)
-        };
-        let candidates = (0..self.held.len()).filter(|register| !keep.contains(&(*register as Register)));
-        let farthest = candidates.max_by_key(distance)?;
-        let id = self.held[farthest].take()?;
-        let Known { slot, source, .. } = &self.known[id as usize];
-        if slot.is_none() && source.is_none() {
-            let slot = self.free_slots.pop().unwrap_or_else(|| {
-                self.slots += 1;
-                self.slots - 1
-            });
-            let address = self.slot(slot)?;
-            self.assembler.vector(code::STORE, farthest as Register, None, Last::Memory(address));
-            self.known[id as usize].slot = Some(slot);
-        }
-        self.known[id as usize].register = None;
-        Some(farthest as Register)
-    }
-
-    /// Where a value is that has no register.
-    fn memory(&mut self, id: Id) -> Option<Address> {
-        match (self.known[id as usize].slot, self.known[id as usize].source) {
-            (Some(slot), _) => self.slot(slot),
-            (None, Some(Step::Constant(bits))) => {
-                let next = self.constants.len();
-                let at = *self.constants.entry(bits).or_insert(next);
-                let (copies, base) = (self.width.copies(), self.pointer(Pointer::Numbers)?);
-                let offset = offset(self.arrays.constants + at * copies, 8)?;
-                Some(Address { base, index: None, offset, broadcast: copies == 1 })
-            }
-            (None, Some(Step::Load(entry))) => self.entry(entry),
-            _ => None,
-        }
-    }
-
-    fn slot(&self, slot: usize) -> Option<Address> {
-        let offset = offset(self.first_slot + slot, self.width.bytes())?;
-        Some(Address { base: General::Rdx, index: None, offset, broadcast: false })
-    }
-
-    fn entry(&mut self, Entry { array, at, stride }: Entry) -> Option<Address> {
-        let broadcast = matches!(array, Array::Table(_));
-        let size = if broadcast { 8 } else { self.width.bytes() };
-        let memory = self.arrays.memory;
-        let (base, first) = match array {
-            Array::Input(_) | Array::Result(_) => (self.pointer(Pointer::Array(array))?, 0),
-            Array::Table(run) => (self.pointer(Pointer::Numbers)?, *self.arrays.tables.get(run)?),
-            Array::Spilled => (General::Rdx, memory.len()),
-            array => (General::Rdx, memory.start(array)),
-        };
-        let index = match stride {
-            0 => None,
-            _ => {
-                let step = offset(stride, size)?;
-                if self.distance != Some(step) {
-                    self.assembler.multiply(DISTANCE, TURN, step);
-                    self.distance = Some(step);
-                }
-                Some(DISTANCE)
-            }
-        };
-        Some(Address { base, index, offset: offset(first + at, size)?, broadcast })
-    }
-
-    /// A register with the address of an array.
-    fn pointer(&mut self, of: Pointer) -> Option<General> {
-        let known = self.pointers.iter().position(|(array, _)| *array == Some(of));
-        let at = match known {
-            Some(at) => at,
-            None => {
-                let at = (0..POINTERS.len()).min_by_key(|at| self.pointers[*at].1)?;
-                let to = POINTERS[at];
-                let (table, place) = match of {
-                    Pointer::Array(Array::Result(k)) => (General::Rsi, k),
-                    Pointer::Array(Array::Input(k)) => (General::Rdi, self.arrays.inputs[k]),
-                    Pointer::Numbers => (General::Rdi, self.arrays.numbers),
-                    Pointer::Array(_) => return None,
-                };
-                self.assembler.read_address(to, table, offset(place, 8)?);
-                at
-            }
-        };
-        self.pointers[at] = (Some(of), self.now + 1);
-        Some(POINTERS[at])
-    }
-}
-
-/// A distance in bytes.
-fn offset(entries: usize, size: i32) -> Option<i32> {
-    i32::try_from(entries).ok()?.checked_mul(size)
 }
