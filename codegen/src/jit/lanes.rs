@@ -42,8 +42,8 @@ impl AllLanes {
     }
 }
 
-/// `L` states of a mechanism at once: every output, and for methods of integration a [`System`] over [`Packed`]. `L` is 2, or up to
-/// [`best_lanes`] 4 or 8. Every state has the bits that [`Compiled`] gives it.
+/// `L` states of a mechanism at once: every output, and for methods of integration a [`System`] over [`Packed`]. `L` is
+/// 2, or up to [`best_lanes`] 4 or 8. Every state has the bits that [`Compiled`] gives it.
 #[derive(Clone, Debug)]
 pub struct CompiledLanes<const L: usize> {
     shared: Arc<Shared<f64>>,
@@ -75,7 +75,7 @@ impl Compiled<f64> {
         };
         lanes.prepare(Output::Rates)?;
         lanes.prepare(Output::Velocities)?;
-        lanes.coordinate_rates_code()?;
+        shared.coordinate_rates_in_lanes(L)?;
         (0..L).for_each(|lane| lanes.take_inputs(lane, self));
         Ok(lanes)
     }
@@ -104,32 +104,12 @@ impl<const L: usize> CompiledLanes<L> {
         set::<L>(&mut self.fields[field], lane, row);
     }
 
-    fn of_width(&self) -> Result<&OfWidth, CompileError> {
-        let none = || CompileError::machine(format!("there are no vectors of {L} numbers"));
-        self.shared.lanes.of_width(L).ok_or_else(none)
-    }
-
-    fn code(&self, output: Output) -> Result<&MachineCode<f64>, CompileError> {
-        let make = || self.shared.compiled(output, L);
-        // The list has the order of the enumeration.
-        self.of_width()?.outputs[output as usize].get_or_init(make).as_ref().map_err(CompileError::clone)
-    }
-
-    fn coordinate_rates_code(&self) -> Result<&MachineCode<f64>, CompileError> {
-        let make = || self.shared.compiled_coordinate_rates(L);
-        self.of_width()?.coordinate_rates.get_or_init(make).as_ref().map_err(CompileError::clone)
-    }
-
     /// Compiles an output now, in place of at its first evaluation.
     ///
     /// # Errors
     /// [`CompileError`]; it is `TooLarge` where [`Compiled`] uses the interpreter.
-    pub fn prepare(&mut self, output: Output) -> Result<(), CompileError> {
-        let scratch = self.code(output)?.scratch();
-        if self.scratch.len() < scratch {
-            self.scratch.resize(scratch, 0.0);
-        }
-        Ok(())
+    pub fn prepare(&self, output: Output) -> Result<(), CompileError> {
+        self.shared.in_lanes(output, L).map(|_| ())
     }
 
     /// Computes an output of all states: its arguments and results are those of the generated function ([`Output::spec`]),
@@ -146,13 +126,13 @@ impl<const L: usize> CompiledLanes<L> {
         arguments: &[&[Packed<L>]],
         results: &mut [&mut [Packed<L>]],
     ) -> Result<(), CompileError> {
-        self.prepare(output)?;
-        let mut scratch = std::mem::take(&mut self.scratch);
-        let done = self.code(output).map(|code| {
-            self.call(code, || self.shared.output(output), arguments, results, &mut scratch);
-        });
-        self.scratch = scratch;
-        done
+        let CompiledLanes { shared, fields, scratch, .. } = self;
+        let code = shared.in_lanes(output, L)?;
+        if scratch.len() < code.scratch() {
+            scratch.resize(code.scratch(), 0.0);
+        }
+        call(code, || shared.output(output), (arguments, fields), results, scratch);
+        Ok(())
     }
 
     /// Velocities from momenta, `(q, p) → v`.
@@ -160,32 +140,50 @@ impl<const L: usize> CompiledLanes<L> {
         let done = self.evaluate(Output::Velocities, &[q, p], &mut [v]);
         debug_assert!(done.is_ok(), "the code was made with the lanes");
     }
+}
 
-    /// Calls machine code, or that of one state for one after the other.
-    fn call<'a>(
-        &self,
-        code: &MachineCode<f64>,
-        one: impl FnOnce() -> Result<&'a MachineCode<f64>, &'a CompileError>,
-        arguments: &[&[Packed<L>]],
-        results: &mut [&mut [Packed<L>]],
-        scratch: &mut [f64],
-    ) {
-        let mut given: [&[f64]; INPUTS] = [&[]; INPUTS];
-        for (to, from) in given.iter_mut().zip(arguments) {
-            *to = numbers(from);
-        }
-        for (to, from) in given[ARGUMENTS..].iter_mut().zip(&self.fields) {
-            *to = from;
-        }
-        let (n, mut places): (usize, [&mut [f64]; RESULTS]) = (results.len(), Default::default());
-        for (to, from) in places.iter_mut().zip(results.iter_mut()) {
-            *to = numbers_mut(from);
-        }
-        let done = code.call(&given, &mut places[..n], scratch);
-        // Too large angles: its code is made of the same program.
-        if let (false, Ok(one)) = (done, one()) {
-            one_by_one::<L>(one, &given, results);
-        }
+impl Shared<f64> {
+    fn of_width(&self, lanes: usize) -> Result<&OfWidth, CompileError> {
+        let none = || CompileError::machine(format!("there are no vectors of {lanes} numbers"));
+        self.lanes.of_width(lanes).ok_or_else(none)
+    }
+
+    /// The code of an output for several states, made when it is first asked for.
+    fn in_lanes(&self, output: Output, lanes: usize) -> Result<&MachineCode<f64>, CompileError> {
+        let make = || self.compiled(output, lanes);
+        // The list has the order of the enumeration.
+        self.of_width(lanes)?.outputs[output as usize].get_or_init(make).as_ref().map_err(CompileError::clone)
+    }
+
+    fn coordinate_rates_in_lanes(&self, lanes: usize) -> Result<&MachineCode<f64>, CompileError> {
+        let make = || self.compiled_coordinate_rates(lanes);
+        self.of_width(lanes)?.coordinate_rates.get_or_init(make).as_ref().map_err(CompileError::clone)
+    }
+}
+
+/// Calls machine code with arguments and fields, or that of one state for one after the other.
+fn call<'a, const L: usize>(
+    code: &MachineCode<f64>,
+    one: impl FnOnce() -> Result<&'a MachineCode<f64>, &'a CompileError>,
+    (arguments, fields): (&[&[Packed<L>]], &[Vec<f64>; FIELDS.len()]),
+    results: &mut [&mut [Packed<L>]],
+    scratch: &mut [f64],
+) {
+    let mut given: [&[f64]; INPUTS] = [&[]; INPUTS];
+    for (to, from) in given.iter_mut().zip(arguments) {
+        *to = numbers(from);
+    }
+    for (to, from) in given[ARGUMENTS..].iter_mut().zip(fields) {
+        *to = from;
+    }
+    let (n, mut places): (usize, [&mut [f64]; RESULTS]) = (results.len(), Default::default());
+    for (to, from) in places.iter_mut().zip(results.iter_mut()) {
+        *to = numbers_mut(from);
+    }
+    let done = code.call(&given, &mut places[..n], scratch);
+    // Too large angles: its code is made of the same program.
+    if let (false, Ok(one)) = (done, one()) {
+        one_by_one::<L>(one, &given, results);
     }
 }
 
@@ -244,9 +242,10 @@ impl<const L: usize> System for CompiledLanes<L> {
     }
 
     fn coordinate_rates(&self, q: &Vec<Packed<L>>, v: &Vec<Packed<L>>, qd: &mut Vec<Packed<L>>) {
-        let Ok(code) = self.coordinate_rates_code() else { return };
+        let Ok(code) = self.shared.coordinate_rates_in_lanes(L) else { return };
         let mut scratch = vec![0.0; code.scratch()];
-        self.call(code, || self.shared.coordinate_rates(), &[q, v], &mut [qd], &mut scratch);
+        let one = || self.shared.coordinate_rates();
+        call(code, one, (&[&q[..], &v[..]], &self.fields), &mut [&mut qd[..]], &mut scratch);
     }
 }
 

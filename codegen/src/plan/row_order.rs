@@ -2,7 +2,7 @@
 //! start and near it when the plan is made.
 
 use mbd_runtime::integrate::Chart;
-use mbd_runtime::tree::row_order::{order_rows, reorder_rows, row_of, RowLists, RowProducts};
+use mbd_runtime::tree::row_order::{order_rows, reorder_rows, row_of, RowLists, RowProducts, FEWEST};
 use mbd_runtime::tree::Elimination;
 use mbd_runtime::Interpreter;
 
@@ -36,8 +36,8 @@ impl RowLists for Plan {
 
 /// Orders the rows of a plan that is being made.
 pub(super) fn order(plan: &mut Plan) {
-    // Two rows have no bad order, and most models have none at all.
-    if plan.dims.rows >= 3 {
+    // Most models have no rows at all.
+    if plan.dims.rows >= FEWEST {
         order_rows(plan, products(plan), LARGE);
     }
 }

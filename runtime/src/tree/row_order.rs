@@ -100,7 +100,7 @@ pub trait RowLists {
 }
 
 /// With fewer rows no order is better than another.
-const FEWEST: usize = 3;
+pub const FEWEST: usize = 3;
 
 /// Orders the rows anew, the largest relative pivot first, where the order that they have loses digits at a position.
 /// Returns whether anything has changed.

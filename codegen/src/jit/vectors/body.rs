@@ -264,9 +264,8 @@ impl Instructions for Body {
     fn sines_of_array(&mut self, n: usize) {
         let (open, (), _) = self.open_loop(n, false, Vec::new());
         let angle = self.load(Place::moving(Array::Angles, 0, (), 1));
-        for ([sin, cos], arrays) in self.pairs(&[angle]).into_iter().zip([[Array::Sines, Array::Cosines]]) {
-            self.store(Place::moving(arrays[0], 0, (), 1), sin);
-            self.store(Place::moving(arrays[1], 0, (), 1), cos);
+        for (array, value) in [Array::Sines, Array::Cosines].into_iter().zip(self.pairs(&[angle])[0]) {
+            self.store(Place::moving(array, 0, (), 1), value);
         }
         self.close_loop(open, Vec::new());
     }
