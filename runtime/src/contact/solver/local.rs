@@ -1,11 +1,17 @@
 //! One contact by itself, exactly.
 
 use super::{cone, Terms, Touch};
-use crate::integrate::root::root;
 use crate::system::Real;
 
 /// Points of the circle of directions between which roots are bracketed.
 const SECTORS: usize = 32;
+/// The first of them: not on an axis, where plane problems have their roots. Cosine and sine of 0.1 rad.
+const FIRST: [f64; 2] = [0.995_004_165_278_025_8, 0.099_833_416_646_828_15];
+/// Cosine and sine of the angle of a sector, 2π/32, and the tangent of its half.
+const SECTOR: [f64; 2] = [0.980_785_280_403_230_4, 0.195_090_322_016_128_28];
+const HALF_SECTOR: f64 = 0.098_491_403_357_164_25;
+/// Largest number of steps to a root within a sector: more than halving takes.
+const NEWTON: u32 = 120;
 /// Part of the largest diagonal entry below which a row cannot move.
 const IDLE: f64 = 1e-13;
 
@@ -100,12 +106,8 @@ fn parted<S: Real>(block: &Block<S>, friction: S, least: S) -> Option<[S; 3]> {
         Some([px, py])
     } else {
         // With a given normal impulse, friction is that of a plane problem.
-        let along = |[a, b]: [S; 2]| {
-            let p = [least, -(radius * a), -(radius * b)];
-            let [_, vx, vy] = block.velocity(p);
-            (a * vy - b * vx, a * vx + b * vy)
-        };
-        direction(along).map(|[a, b]| [-(radius * a), -(radius * b)])
+        let flow = Flow::of_friction(block, least, radius);
+        direction(&flow, |t| Some(flow.along(t))).map(|t| t.map(|t| -(radius * t)))
     };
     let [px, py] = tangential?;
     let p = [least, px, py];
@@ -136,16 +138,10 @@ fn slid<S: Real>(block: &Block<S>, friction: S, least: S) -> [S; 3] {
     let pivot = |[a, b]: [S; 2]| w[0][0] - friction * (w[0][1] * a + w[0][2] * b);
     let impulse = |n: S, [a, b]: [S; 2]| [n, -(friction * n * a), -(friction * n * b)];
     // The velocity times the pivot, which has no poles.
-    let along = |t: [S; 2]| {
-        let (pivot, [a, b]) = (pivot(t), t);
-        let u: [S; 2] = core::array::from_fn(|i| {
-            let w = w[i + 1];
-            q[i + 1] * pivot - q[0] * (w[0] - friction * (w[1] * a + w[2] * b))
-        });
-        (a * u[1] - b * u[0], if pivot > zero { (a * u[0] + b * u[1]) / pivot } else { -S::one() })
-    };
+    let flow = Flow::new(|i| q[i] * w[0][0] - q[0] * w[i][0], |i, j| friction * (q[0] * w[i][j] - q[i] * w[0][j]));
+    let along = |t: [S; 2]| (pivot(t) > zero).then(|| flow.along(t) / pivot(t));
     let normal = |t: [S; 2]| Some(-(q[0] / pivot(t))).filter(|n| *n > zero);
-    match direction(along).and_then(|t| Some((t, normal(t)?))) {
+    match direction(&flow, along).and_then(|t| Some((t, normal(t)?))) {
         Some((t, n)) => impulse(if n > least { n } else { least }, t),
         // No direction holds: the nearest impulse on the cone keeps the iteration going.
         None => {
@@ -157,24 +153,58 @@ fn slid<S: Real>(block: &Block<S>, friction: S, least: S) -> [S; 3] {
     }
 }
 
-/// The direction of the circle along which a velocity points outwards: `of` gives the velocity's components across and
-/// along a direction. Of several, the one with the largest component along it.
-pub(super) fn direction<S: Real>(of: impl Fn([S; 2]) -> (S, S)) -> Option<[S; 2]> {
-    let zero = S::zero();
-    // No start on an axis, where plane problems have their roots.
-    let turn = core::f64::consts::TAU / SECTORS as f64;
-    let point = |x: f64| {
-        let (s, c) = S::constant(x).sin_cos();
-        [c, s]
-    };
+/// A tangential velocity for each direction `[a, b]` of the friction: `at + turn·[a, b]`, without derivatives. Steps of
+/// Newton's method refine what comes of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Flow<S> {
+    at: [S; 2],
+    turn: [[S; 2]; 2],
+}
+
+impl<S: Real> Flow<S> {
+    fn new(at: impl Fn(usize) -> S, turn: impl Fn(usize, usize) -> S) -> Self {
+        let value = |x: S| S::constant(x.to_f64());
+        Flow { at: [1, 2].map(|i| value(at(i))), turn: [1, 2].map(|i| [1, 2].map(|j| value(turn(i, j)))) }
+    }
+
+    /// Under a given normal impulse, with friction of the size `radius` against each direction.
+    pub fn of_friction(Block { w, q }: &Block<S>, normal: S, radius: S) -> Self {
+        Flow::new(|i| q[i] + w[i][0] * normal, |i, j| -(radius * w[i][j]))
+    }
+
+    /// The velocity for a vector of some `size`, times this size.
+    fn velocity(&self, [a, b]: [S; 2], size: S) -> [S; 2] {
+        core::array::from_fn(|i| self.at[i] * size + self.turn[i][0] * a + self.turn[i][1] * b)
+    }
+
+    /// Its component across the vector.
+    fn across(&self, t: [S; 2], size: S) -> S {
+        let [x, y] = self.velocity(t, size);
+        t[0] * y - t[1] * x
+    }
+
+    /// The component along a unit vector.
+    pub fn along(&self, t: [S; 2]) -> S {
+        let [x, y] = self.velocity(t, S::one());
+        t[0] * x + t[1] * y
+    }
+}
+
+/// The direction of the circle along which a velocity points outwards; `along` gives its component there, or none where
+/// the direction is not possible. Of several, the one with the largest component.
+pub(super) fn direction<S: Real>(flow: &Flow<S>, along: impl Fn([S; 2]) -> Option<S>) -> Option<[S; 2]> {
+    let (zero, one) = (S::zero(), S::one());
+    let [c, s] = SECTOR.map(S::constant);
     let mut best: Option<(S, [S; 2])> = None;
-    let mut before = (0.1, of(point(0.1)));
-    for k in 1..=SECTORS {
-        let angle = 0.1 + turn * k as f64;
-        let here = (angle, of(point(angle)));
-        let crosses = (before.1 .0 <= zero) != (here.1 .0 <= zero);
-        if crosses {
-            if let Some((along, found)) = refine(&of, &point, (before.0, before.1 .0), (here.0, here.1 .0)) {
+    let first = FIRST.map(S::constant);
+    let mut before = (first, flow.across(first, one));
+    for _ in 0..SECTORS {
+        let [a, b] = before.0;
+        let here = [a * c - b * s, a * s + b * c];
+        let here = (here, flow.across(here, one));
+        if (before.1 <= zero) != (here.1 <= zero) {
+            let found = refine(flow, before);
+            if let Some(along) = along(found).filter(|along| *along > zero) {
                 if best.is_none_or(|(most, _)| along > most) {
                     best = Some((along, found));
                 }
@@ -185,22 +215,35 @@ pub(super) fn direction<S: Real>(of: impl Fn([S; 2]) -> (S, S)) -> Option<[S; 2]
     best.map(|(_, found)| found)
 }
 
-/// A root of the component across between two angles, if the velocity points outwards there.
-fn refine<S: Real>(
-    of: &impl Fn([S; 2]) -> (S, S),
-    point: &impl Fn(f64) -> [S; 2],
-    (a, at_a): (f64, S),
-    (b, at_b): (f64, S),
-) -> Option<(S, [S; 2])> {
-    let zero = S::zero();
-    let falls = at_a > zero;
-    let signed = |x: S| if falls { x } else { -x };
-    let c = S::constant;
-    let angle = root((c(a), signed(at_a)), (c(b), signed(at_b)), S::epsilon(), |x| {
-        let across = signed(of(point(x.to_f64())).0);
-        (across, across <= zero)
-    });
-    let found = point(angle.to_f64());
-    let (_, along) = of(found);
-    (along > zero).then_some((along, found))
+/// A root of the component across within a sector, whose first direction comes with the component there: Newton's method,
+/// and halving where it leaves the part of the sector with the change of sign. Directions are rational in the tangent `x`
+/// of half their angle from the first one.
+fn refine<S: Real>(flow: &Flow<S>, ([a, b], at_start): ([S; 2], S)) -> [S; 2] {
+    let (zero, one, two) = (S::zero(), S::one(), S::constant(2.0));
+    let falls = at_start > zero;
+    let turned = |c: S, s: S| [a * c - b * s, a * s + b * c];
+    let (mut low, mut high) = (zero, S::constant(HALF_SECTOR));
+    let mut x = S::constant(0.5) * high;
+    for _ in 0..NEWTON {
+        let (c, s, size) = (one - x * x, two * x, one + x * x);
+        let (t, dt, dsize) = (turned(c, s), turned(-s, two), s);
+        let (v, dv) = (flow.velocity(t, size), flow.velocity(dt, dsize));
+        let across = t[0] * v[1] - t[1] * v[0];
+        let slope = dt[0] * v[1] - dt[1] * v[0] + t[0] * dv[1] - t[1] * dv[0];
+        if (across > zero) == falls {
+            low = x;
+        } else {
+            high = x;
+        }
+        let newton = x - across / slope;
+        let next = if newton > low && newton < high { newton } else { S::constant(0.5) * (low + high) };
+        let change = (next - x).abs().to_f64();
+        x = next;
+        if !(change > S::epsilon()) {
+            break;
+        }
+    }
+    let [x, y] = turned(one - x * x, two * x);
+    let size = (x * x + y * y).sqrt();
+    [x / size, y / size]
 }

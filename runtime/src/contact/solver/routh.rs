@@ -6,7 +6,7 @@
 //! straight pieces. Where it turns, its angle `φ` and the speed of slip `s` are integrated over `τ` with `dπ = s dτ`:
 //! `dφ/dτ` is then finite where the slip comes to rest, which `s` approaches like an exponential function.
 
-use super::local::{self, Block};
+use super::local::{self, Block, Flow};
 use super::{ContactError, Touch};
 use crate::contact::{Contact, RestitutionLaw};
 use crate::integrate::{Direction, Dop853, Events, Outcome, Solver, Step, Tolerances, Watch};
@@ -143,16 +143,15 @@ impl<S: Real> Process<S> {
             return Ok(None);
         }
         let friction = self.friction;
-        let velocity = |[a, b]: [S; 2]| {
-            let [_, x, y] = self.rate([S::one(), -(friction * a), -(friction * b)]);
-            (a * y - b * x, a * x + b * y)
-        };
-        let found = local::direction(velocity);
+        let block = Block { w: self.w, q: [S::zero(); 3] };
+        let flow = Flow::of_friction(&block, S::one(), friction);
+        let Some(found) = local::direction(&flow, |t| Some(flow.along(t))) else { return Ok(None) };
         // The search gives the direction without a derivative, which it has not in a plane.
-        let turns = |t| velocity(t).0.derivative().is_some_and(|d| !(d.abs() <= TURNS));
-        match found.is_some_and(turns) {
+        let [a, b] = found;
+        let [_, x, y] = self.rate([S::one(), -(friction * a), -(friction * b)]);
+        match (a * y - b * x).derivative().is_some_and(|d| !(d.abs() <= TURNS)) {
             true => Err(ContactError::NoDerivative),
-            false => Ok(found),
+            false => Ok(Some([a, b])),
         }
     }
 
