@@ -9,13 +9,13 @@ use mbd_runtime::Interpreter;
 use super::instructions::{width, INPUTS};
 use super::lanes::AllLanes;
 use super::memory::{MachineCode, Number};
-use super::CompileError;
+use super::{vectors, CompileError};
 use crate::code::{compile, Code};
 use crate::model::{Gravity, Model};
 use crate::options::Options;
 use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
-use crate::rolled::{rolled, together};
+use crate::rolled::{rolled, together, Together};
 use crate::search;
 use crate::trace::{chosen_frames, coordinate_rates, sizes};
 
@@ -95,9 +95,10 @@ impl<S: Number> Shared<S> {
         }
         let mut program = compile(plan, output, options)?;
         if let Code::Straight(straight) = &program.program {
-            let width = width(S::PRECISION, 1);
-            if let Some(both) = together(plan, output, options).filter(|b| b.program.pays_in(width, straight, options))
-            {
+            let width = |both: &Together| vectors::one_state(S::PRECISION)
+                .map_or(width(S::PRECISION, 1), |width| width.branches(&both.program));
+            let pays = |both: &Together| both.pays_in(width(both), straight, options);
+            if let Some(both) = together(plan, output, options).filter(|both| pays(&both.program)) {
                 // Every state has the same bits, alone or in a lane.
                 program = both.map(|both| match lanes {
                     1 => Code::Rolled(both.program),

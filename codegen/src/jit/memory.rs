@@ -159,9 +159,10 @@ impl<S: Number> MachineCode<S> {
         signature.returns.push(AbiParam::new(types::I32));
         let id = module.declare_function(program.spec.name, Linkage::Local, &signature);
         let id = id.map_err(CompileError::machine)?;
-        let body = match Width::of_lanes(lanes) {
+        let body = match Width::of_lanes(lanes).filter(|_| S::PRECISION == Precision::F64) {
             Some(width) => {
-                let written = vectors::compile(program, &results, fused, width)
+                let sines = S::SINES[usize::from(fast)] as usize as u64;
+                let written = vectors::compile(program, &results, fused, width, sines)
                     .ok_or_else(|| CompileError::machine("the code is too long for vectors"))?;
                 module.define_function_bytes(id, 64, &written.bytes, &[]).map_err(CompileError::machine)?;
                 Body { scratch: written.scratch, size: written.bytes.len(), numbers: written.numbers }
