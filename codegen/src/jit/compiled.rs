@@ -6,9 +6,9 @@ use mbd_runtime::contact::{Reducible, Way};
 use mbd_runtime::tree::row_order::RowProducts;
 use mbd_runtime::Interpreter;
 
-use super::instructions::{width, INPUTS};
+use super::instructions::{width, ARGUMENTS, INPUTS};
 use super::lanes::AllLanes;
-use super::memory::{MachineCode, Number};
+use super::memory::{Inputs, MachineCode, Number};
 use super::{vectors, CompileError};
 use crate::code::{compile, Code};
 use crate::model::{Gravity, Model};
@@ -95,8 +95,9 @@ impl<S: Number> Shared<S> {
         }
         let mut program = compile(plan, output, options)?;
         if let Code::Straight(straight) = &program.program {
-            let width = |both: &Together| vectors::one_state(S::PRECISION)
-                .map_or(width(S::PRECISION, 1), |width| width.branches(&both.program));
+            let width = |both: &Together| {
+                vectors::one_state(S::PRECISION).map_or(width(S::PRECISION, 1), |width| width.branches(&both.program))
+            };
             let pays = |both: &Together| both.pays_in(width(both), straight, options);
             if let Some(both) = together(plan, output, options).filter(|both| pays(&both.program)) {
                 // Every state has the same bits, alone or in a lane.
@@ -260,7 +261,15 @@ impl<S: Number> Compiled<S> {
         self.check_arrays(output, arguments, results)?;
         let given = |k: usize| arguments.get(k).copied().unwrap_or_default();
         let scratch = long_enough(&mut self.scratch, code);
-        call(code, [given(0), given(1), given(2)], (&self.interpreter, &self.params, &self.acts), results, scratch);
+        let arguments = [given(0), given(1), given(2)];
+        let given = Given {
+            arguments,
+            inputs: &self.interpreter,
+            params: &self.params,
+            acts: &self.acts,
+            reads_gravity: code.reads_gravity(),
+        };
+        code.call(&given, results, scratch);
         Ok(())
     }
 
@@ -276,7 +285,15 @@ impl<S: Number> Compiled<S> {
         }
         let Ok(code) = self.shared.output(output) else { return false };
         let scratch = long_enough(&mut self.scratch, code);
-        call(code, arguments, (&self.interpreter, &self.params, &self.acts), results, scratch);
+        let given = Given {
+            arguments,
+            inputs: &self.interpreter,
+            params: &self.params,
+            acts: &self.acts,
+            reads_gravity: code.reads_gravity(),
+        };
+        // Code for one state never gives up.
+        code.call(&given, results, scratch);
         true
     }
 
@@ -344,7 +361,14 @@ impl<S: Number> Compiled<S> {
         // These programs have few angles, or none, so that nothing is allocated.
         let (mut few, mut many) = ([S::zero(); FEW], Vec::new());
         let scratch = if code.scratch() <= FEW { &mut few[..] } else { long_enough(&mut many, code) };
-        call(code, [q, v, &[]], (&self.interpreter, &self.params, &self.acts), &mut [qd], scratch);
+        let given = Given {
+            arguments: [q, v, &[]],
+            inputs: &self.interpreter,
+            params: &self.params,
+            acts: &self.acts,
+            reads_gravity: code.reads_gravity(),
+        };
+        code.call(&given, &mut [qd], scratch);
         true
     }
 }
@@ -397,20 +421,28 @@ fn long_enough<'a, S: Number>(scratch: &'a mut Vec<S>, code: &MachineCode<S>) ->
     scratch
 }
 
-/// Calls machine code with the inputs of an interpreter, parameters, and the rows that act.
-#[inline]
-fn call<S: Number>(
-    code: &MachineCode<S>,
-    [a, b, c]: [&[S]; 3],
-    (inputs, params, acts): (&Interpreter<S>, &[S], &[S]),
-    results: &mut [&mut [S]],
-    scratch: &mut [S],
-) {
-    // In the order of the table of fields.
-    let Interpreter { tau, drive_q, drive_v, drive_a, wrenches, gravity, .. } = inputs;
-    let gravity = if code.reads_gravity() { &gravity[..] } else { &[] };
-    let given: [&[S]; INPUTS] =
-        [a, b, c, tau, drive_q, drive_v, drive_a, wrenches.as_flattened(), params, acts, gravity];
-    // Code for one state never gives up.
-    code.call(&given, results, scratch);
+/// What machine code of one state reads: arguments, the inputs of an interpreter, parameters, and the rows that act.
+struct Given<'a, S: Number> {
+    arguments: [&'a [S]; ARGUMENTS],
+    inputs: &'a Interpreter<S>,
+    params: &'a [S],
+    acts: &'a [S],
+    /// Whether gravity is an input.
+    reads_gravity: bool,
+}
+
+impl<S: Number> Inputs<S> for Given<'_, S> {
+    #[inline]
+    fn first(&self) -> [&[S]; ARGUMENTS + 1] {
+        let [a, b, c] = self.arguments;
+        [a, b, c, &self.inputs.tau]
+    }
+
+    #[inline]
+    fn more(&self) -> [&[S]; INPUTS - ARGUMENTS - 1] {
+        // In the order of the table of fields.
+        let Interpreter { drive_q, drive_v, drive_a, wrenches, gravity, .. } = self.inputs;
+        let gravity = if self.reads_gravity { &gravity[..] } else { &[] };
+        [drive_q, drive_v, drive_a, wrenches.as_flattened(), self.params, self.acts, gravity]
+    }
 }

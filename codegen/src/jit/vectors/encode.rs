@@ -150,6 +150,8 @@ pub struct Assembler {
     bytes: Vec<u8>,
     /// Forward jumps that lead to the exit.
     exits: Vec<Jump>,
+    /// Whether registers were written beyond their first 16 bytes.
+    upper: bool,
 }
 
 /// An instruction with its operands.
@@ -168,7 +170,7 @@ struct Instruction {
 
 impl Assembler {
     pub fn new(wide: bool) -> Assembler {
-        Assembler { wide, bytes: Vec::new(), exits: Vec::new() }
+        Assembler { wide, bytes: Vec::new(), exits: Vec::new(), upper: false }
     }
 
     /// `to = code(a, last)`; instructions of two operands have no `a`.
@@ -199,6 +201,7 @@ impl Assembler {
             Some(single) if i.lanes == Lanes::One => single,
             _ => (i.code.prefix, i.code.byte),
         };
+        self.upper |= i.lanes > Lanes::Two;
         let evex = self.evex(&i);
         if evex {
             self.evex_prefix(&i, prefix);

@@ -216,9 +216,7 @@ impl Writer<'_> {
     fn value(&mut self, id: Id, step: Step) -> Option<()> {
         let lanes = self.lanes(id);
         match step {
-            Step::Constant(_)
-            | Step::Again(_)
-            | Step::Load(Entry { array: Array::Input(_) | Array::Table(_), .. }) => {
+            Step::Constant(_) | Step::Again(_) | Step::Load(Entry { array: Array::Input(_) | Array::Table(_), .. }) => {
                 // It is read where it is used.
                 self.known[id as usize].source = Some(step);
                 return Some(());

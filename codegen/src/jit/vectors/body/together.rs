@@ -97,4 +97,3 @@ impl Body {
         [places[1], places[2]]
     }
 }
-

@@ -146,8 +146,18 @@ impl Assembler {
 
     /// The function returns 0.
     pub fn return_0(&mut self) {
-        // xor eax, eax; vzeroupper; ret
-        self.bytes.extend([0x31, 0xc0, 0xc5, 0xf8, 0x77, 0xc3]);
+        // xor eax, eax
+        self.bytes.extend([0x31, 0xc0]);
+        self.leave();
+    }
+
+    /// Returns.
+    fn leave(&mut self) {
+        if self.upper {
+            // vzeroupper
+            self.bytes.extend([0xc5, 0xf8, 0x77]);
+        }
+        self.bytes.push(0xc3);
     }
 
     /// Ends the code: from its exits the function returns 1.
@@ -155,8 +165,9 @@ impl Assembler {
         let exits = std::mem::take(&mut self.exits);
         if !exits.is_empty() {
             exits.into_iter().for_each(|exit| self.land(exit));
-            // mov eax, 1; vzeroupper; ret
-            self.bytes.extend([0xb8, 1, 0, 0, 0, 0xc5, 0xf8, 0x77, 0xc3]);
+            // mov eax, 1
+            self.bytes.extend([0xb8, 1, 0, 0, 0]);
+            self.leave();
         }
         self.bytes
     }

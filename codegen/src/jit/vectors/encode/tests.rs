@@ -68,7 +68,9 @@ fn vectors_of_64_bytes() {
                 a.vector(EIGHT, SUB, 1, Some(17), Last::Memory(address));
             }),
             ("62 61 fd 48 11 ba 00 20 00 00", &|a| a.vector(EIGHT, STORE, 31, None, at(General::Rdx, 0x2000))),
-            ("62 a2 d5 40 98 e6", &|a| a.vector(EIGHT, fused(Order::Product132, false, false), 20, Some(21), register(22))),
+            ("62 a2 d5 40 98 e6", &|a| {
+                a.vector(EIGHT, fused(Order::Product132, false, false), 20, Some(21), register(22))
+            }),
             ("62 f1 8d 40 73 f3 3f", &|a| a.shift_left(EIGHT, 30, 3, 63)),
             ("62 92 fe 48 39 c9 62 f2 e5 41 65 d4", &|a| a.select(EIGHT, 2, 25, 4, 19)),
             ("62 b1 cd 48 c2 c9 16 62 91 fd c9 28 ec", &|a| a.zero_below(EIGHT, 5, [6, 17, 28])),
