@@ -6,9 +6,10 @@ use mbd_runtime::contact::{Reducible, Way};
 use mbd_runtime::tree::row_order::RowProducts;
 use mbd_runtime::Interpreter;
 
-use super::instructions::{width, ARGUMENTS, INPUTS};
+use super::given::Given;
+use super::instructions::width;
 use super::lanes::AllLanes;
-use super::memory::{Inputs, MachineCode, Number};
+use super::memory::{MachineCode, Number};
 use super::{vectors, CompileError};
 use crate::code::{compile, Code};
 use crate::model::{Gravity, Model};
@@ -262,13 +263,7 @@ impl<S: Number> Compiled<S> {
         let given = |k: usize| arguments.get(k).copied().unwrap_or_default();
         let scratch = long_enough(&mut self.scratch, code);
         let arguments = [given(0), given(1), given(2)];
-        let given = Given {
-            arguments,
-            inputs: &self.interpreter,
-            params: &self.params,
-            acts: &self.acts,
-            reads_gravity: code.reads_gravity(),
-        };
+        let given = Given::new(code, arguments, (&self.interpreter, &self.params, &self.acts));
         code.call(&given, results, scratch);
         Ok(())
     }
@@ -285,13 +280,7 @@ impl<S: Number> Compiled<S> {
         }
         let Ok(code) = self.shared.output(output) else { return false };
         let scratch = long_enough(&mut self.scratch, code);
-        let given = Given {
-            arguments,
-            inputs: &self.interpreter,
-            params: &self.params,
-            acts: &self.acts,
-            reads_gravity: code.reads_gravity(),
-        };
+        let given = Given::new(code, arguments, (&self.interpreter, &self.params, &self.acts));
         // Code for one state never gives up.
         code.call(&given, results, scratch);
         true
@@ -361,13 +350,7 @@ impl<S: Number> Compiled<S> {
         // These programs have few angles, or none, so that nothing is allocated.
         let (mut few, mut many) = ([S::zero(); FEW], Vec::new());
         let scratch = if code.scratch() <= FEW { &mut few[..] } else { long_enough(&mut many, code) };
-        let given = Given {
-            arguments: [q, v, &[]],
-            inputs: &self.interpreter,
-            params: &self.params,
-            acts: &self.acts,
-            reads_gravity: code.reads_gravity(),
-        };
+        let given = Given::new(code, [q, v, &[]], (&self.interpreter, &self.params, &self.acts));
         code.call(&given, &mut [qd], scratch);
         true
     }
@@ -419,30 +402,4 @@ fn long_enough<'a, S: Number>(scratch: &'a mut Vec<S>, code: &MachineCode<S>) ->
         scratch.resize(code.scratch(), S::zero());
     }
     scratch
-}
-
-/// What machine code of one state reads: arguments, the inputs of an interpreter, parameters, and the rows that act.
-struct Given<'a, S: Number> {
-    arguments: [&'a [S]; ARGUMENTS],
-    inputs: &'a Interpreter<S>,
-    params: &'a [S],
-    acts: &'a [S],
-    /// Whether gravity is an input.
-    reads_gravity: bool,
-}
-
-impl<S: Number> Inputs<S> for Given<'_, S> {
-    #[inline]
-    fn first(&self) -> [&[S]; ARGUMENTS + 1] {
-        let [a, b, c] = self.arguments;
-        [a, b, c, &self.inputs.tau]
-    }
-
-    #[inline]
-    fn more(&self) -> [&[S]; INPUTS - ARGUMENTS - 1] {
-        // In the order of the table of fields.
-        let Interpreter { drive_q, drive_v, drive_a, wrenches, gravity, .. } = self.inputs;
-        let gravity = if self.reads_gravity { &gravity[..] } else { &[] };
-        [drive_q, drive_v, drive_a, wrenches.as_flattened(), self.params, self.acts, gravity]
-    }
 }
