@@ -6,16 +6,17 @@ use mbd_runtime::contact::{Reducible, Way};
 use mbd_runtime::tree::row_order::RowProducts;
 use mbd_runtime::Interpreter;
 
-use super::instructions::{width, INPUTS};
+use super::given::Given;
+use super::instructions::width;
 use super::lanes::AllLanes;
 use super::memory::{MachineCode, Number};
-use super::CompileError;
+use super::{vectors, CompileError};
 use crate::code::{compile, Code};
 use crate::model::{Gravity, Model};
 use crate::options::Options;
 use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
-use crate::rolled::{rolled, together};
+use crate::rolled::{rolled, together, Together};
 use crate::search;
 use crate::trace::{chosen_frames, coordinate_rates, sizes};
 
@@ -95,9 +96,11 @@ impl<S: Number> Shared<S> {
         }
         let mut program = compile(plan, output, options)?;
         if let Code::Straight(straight) = &program.program {
-            let width = width(S::PRECISION, 1);
-            if let Some(both) = together(plan, output, options).filter(|b| b.program.pays_in(width, straight, options))
-            {
+            let width = |both: &Together| {
+                vectors::one_state(S::PRECISION).map_or(width(S::PRECISION, 1), |width| width.branches(&both.program))
+            };
+            let pays = |both: &Together| both.pays_in(width(both), straight, options);
+            if let Some(both) = together(plan, output, options).filter(|both| pays(&both.program)) {
                 // Every state has the same bits, alone or in a lane.
                 program = both.map(|both| match lanes {
                     1 => Code::Rolled(both.program),
@@ -259,7 +262,9 @@ impl<S: Number> Compiled<S> {
         self.check_arrays(output, arguments, results)?;
         let given = |k: usize| arguments.get(k).copied().unwrap_or_default();
         let scratch = long_enough(&mut self.scratch, code);
-        call(code, [given(0), given(1), given(2)], (&self.interpreter, &self.params, &self.acts), results, scratch);
+        let arguments = [given(0), given(1), given(2)];
+        let given = Given::new(code, arguments, (&self.interpreter, &self.params, &self.acts));
+        code.call(&given, results, scratch);
         Ok(())
     }
 
@@ -275,7 +280,9 @@ impl<S: Number> Compiled<S> {
         }
         let Ok(code) = self.shared.output(output) else { return false };
         let scratch = long_enough(&mut self.scratch, code);
-        call(code, arguments, (&self.interpreter, &self.params, &self.acts), results, scratch);
+        let given = Given::new(code, arguments, (&self.interpreter, &self.params, &self.acts));
+        // Code for one state never gives up.
+        code.call(&given, results, scratch);
         true
     }
 
@@ -343,7 +350,8 @@ impl<S: Number> Compiled<S> {
         // These programs have few angles, or none, so that nothing is allocated.
         let (mut few, mut many) = ([S::zero(); FEW], Vec::new());
         let scratch = if code.scratch() <= FEW { &mut few[..] } else { long_enough(&mut many, code) };
-        call(code, [q, v, &[]], (&self.interpreter, &self.params, &self.acts), &mut [qd], scratch);
+        let given = Given::new(code, [q, v, &[]], (&self.interpreter, &self.params, &self.acts));
+        code.call(&given, &mut [qd], scratch);
         true
     }
 }
@@ -394,22 +402,4 @@ fn long_enough<'a, S: Number>(scratch: &'a mut Vec<S>, code: &MachineCode<S>) ->
         scratch.resize(code.scratch(), S::zero());
     }
     scratch
-}
-
-/// Calls machine code with the inputs of an interpreter, parameters, and the rows that act.
-#[inline]
-fn call<S: Number>(
-    code: &MachineCode<S>,
-    [a, b, c]: [&[S]; 3],
-    (inputs, params, acts): (&Interpreter<S>, &[S], &[S]),
-    results: &mut [&mut [S]],
-    scratch: &mut [S],
-) {
-    // In the order of the table of fields.
-    let Interpreter { tau, drive_q, drive_v, drive_a, wrenches, gravity, .. } = inputs;
-    let gravity = if code.reads_gravity() { &gravity[..] } else { &[] };
-    let given: [&[S]; INPUTS] =
-        [a, b, c, tau, drive_q, drive_v, drive_a, wrenches.as_flattened(), params, acts, gravity];
-    // Code for one state never gives up.
-    code.call(&given, results, scratch);
 }

@@ -195,7 +195,8 @@ fn one_by_one<const L: usize>(code: &MachineCode<f64>, given: &[&[f64]; INPUTS],
         let of_lane = given.map(|all| all.iter().skip(lane).step_by(L).copied().collect::<Vec<f64>>());
         let mut found: Vec<Vec<f64>> = results.iter().map(|all| vec![0.0; all.len()]).collect();
         let mut places: Vec<&mut [f64]> = found.iter_mut().map(|all| &mut all[..]).collect();
-        code.call(&std::array::from_fn(|k| &of_lane[k][..]), &mut places, &mut scratch);
+        let given: [&[f64]; INPUTS] = std::array::from_fn(|k| &of_lane[k][..]);
+        code.call(&given, &mut places, &mut scratch);
         for (to, from) in results.iter_mut().zip(found) {
             to.iter_mut().zip(from).for_each(|(to, from)| to.0[lane] = from);
         }

@@ -10,11 +10,13 @@
 //! - The memory of the code lives as long as the function and is never changed after it was made, so that any number of
 //!   threads may call it.
 //! - The functions for sines and cosines are called by this code alone, with parts of the working memory.
-//! - Code in vectors of 32 and 64 bytes is made only where the processor has them. It changes no register that belongs
-//!   to its caller.
+//! - Code that is not Cranelift's is made only where the processor has its instructions. It changes no register that
+//!   belongs to its caller.
+//! - The tables of addresses may have places that are not written: the code reads only those of arrays with entries.
 #![allow(unsafe_code)]
 
 use std::collections::BTreeMap;
+use std::mem::MaybeUninit;
 
 use cranelift::codegen::ir::{Function, UserFuncName};
 use cranelift::codegen::Context;
@@ -22,7 +24,7 @@ use cranelift::jit::{JITBuilder, JITModule};
 use cranelift::module::{default_libcall_names, Linkage, Module};
 use cranelift::prelude::*;
 
-use super::instructions::{input_places, width, write, Shape, BLOCK, INPUTS};
+use super::instructions::{input_places, width, write, Shape, ARGUMENTS, BLOCK, INPUTS};
 use super::vectors::{self, Width};
 use super::CompileError;
 use crate::code::Code;
@@ -108,16 +110,41 @@ pub struct MachineCode<S> {
     /// Owns the code; `None` only while it is dropped.
     module: Option<JITModule>,
     entry: Entry<S>,
-    /// Lengths of the input arrays.
+    /// Lengths of the input arrays; those that it does not have are empty.
     inputs: [usize; INPUTS],
+    /// Whether fields other than the first one are among them.
+    more: bool,
     /// Number and lengths of the result arrays; those that it does not have are empty.
     results: (usize, [usize; RESULTS]),
     /// Length of the working memory.
     scratch: usize,
     /// Length of the code, bytes.
     size: usize,
-    /// Constants and tables that the code reads, from the first address on that vectors may have.
+    /// Constants and tables that the code reads.
     constants: Box<[S]>,
+    /// The first entry that is at an address that vectors may have.
+    first_constant: usize,
+}
+
+/// The input arrays of a call.
+pub trait Inputs<S> {
+    /// The arguments, and the first field.
+    fn first(&self) -> [&[S]; ARGUMENTS + 1];
+
+    /// The other fields.
+    fn more(&self) -> [&[S]; INPUTS - ARGUMENTS - 1];
+}
+
+impl<S> Inputs<S> for [&[S]; INPUTS] {
+    #[inline]
+    fn first(&self) -> [&[S]; ARGUMENTS + 1] {
+        std::array::from_fn(|k| self[k])
+    }
+
+    #[inline]
+    fn more(&self) -> [&[S]; INPUTS - ARGUMENTS - 1] {
+        std::array::from_fn(|k| self[ARGUMENTS + 1 + k])
+    }
 }
 
 /// Tables and working memory begin where lines of the cache do, so that no vector lies in two of them.
@@ -159,9 +186,10 @@ impl<S: Number> MachineCode<S> {
         signature.returns.push(AbiParam::new(types::I32));
         let id = module.declare_function(program.spec.name, Linkage::Local, &signature);
         let id = id.map_err(CompileError::machine)?;
-        let body = match Width::of_lanes(lanes) {
+        let body = match Width::of_lanes(lanes).filter(|_| S::PRECISION == Precision::F64) {
             Some(width) => {
-                let written = vectors::compile(program, &results, fused, width)
+                let sines = S::SINES[usize::from(fast)] as usize as u64;
+                let written = vectors::compile(program, &results, fused, width, sines)
                     .ok_or_else(|| CompileError::machine("the code is too long for vectors"))?;
                 module.define_function_bytes(id, 64, &written.bytes, &[]).map_err(CompileError::machine)?;
                 Body { scratch: written.scratch, size: written.bytes.len(), numbers: written.numbers }
@@ -221,6 +249,7 @@ impl<S: Number> MachineCode<S> {
         for (array, place) in program.inputs.iter().zip(input_places(&program.inputs)) {
             inputs[place] = lanes * array.len();
         }
+        let more = inputs[ARGUMENTS + 1..].iter().any(|len| *len > 0);
         let mut lengths = [0; RESULTS];
         lengths.iter_mut().zip(&results).for_each(|(to, len)| *to = lanes * len);
         let results = (results.len(), lengths);
@@ -228,10 +257,12 @@ impl<S: Number> MachineCode<S> {
             module: Some(module),
             entry,
             inputs,
+            more,
             results,
             scratch: lanes * body.scratch + padding::<S>(),
             size: body.size,
             constants,
+            first_constant: first,
         })
     }
 
@@ -251,34 +282,41 @@ impl<S: Number> MachineCode<S> {
         self.inputs[INPUTS - 1] > 0
     }
 
-    /// Runs the code. `inputs` are the arguments, then the fields. Returns whether it computed the results: code in vectors
-    /// of more than 16 bytes gives up where an angle is beyond the range of the main path of sine and cosine.
+    /// Runs the code. Returns whether it computed the results: code for several states gives up where an angle is beyond the
+    /// range of the main path of sine and cosine.
     ///
     /// # Panics
     /// If a slice has another length than its array, or the working memory is too short.
     #[inline]
-    pub fn call(&self, inputs: &[&[S]; INPUTS], results: &mut [&mut [S]], scratch: &mut [S]) -> bool {
+    pub fn call(&self, inputs: &impl Inputs<S>, results: &mut [&mut [S]], scratch: &mut [S]) -> bool {
         assert!(scratch.len() >= self.scratch, "the working memory is too short");
-        // Differences are collected without a branch.
-        let other = inputs.iter().zip(&self.inputs).fold(0, |all, (input, len)| all | (input.len() ^ len));
-        assert!(other == 0, "the inputs have the lengths {:?}, expected {:?}", inputs.map(<[S]>::len), self.inputs);
+        // Few programs read other fields than joint forces, and a call of a small one takes as long as its code. Nothing is
+        // read from the places that are not written.
+        let mut read = [const { MaybeUninit::uninit() }; INPUTS + 1];
+        read[INPUTS].write(self.constants[self.first_constant..].as_ptr());
+        let mut set = |first: usize, arrays: &[&[S]]| {
+            for (k, array) in arrays.iter().enumerate() {
+                let expected = self.inputs[first + k];
+                assert!(array.len() == expected, "an input has {} entries, expected {expected}", array.len());
+                read[first + k].write(array.as_ptr());
+            }
+        };
+        set(0, &inputs.first());
+        if self.more {
+            set(ARGUMENTS + 1, &inputs.more());
+        }
         let (count, lengths) = &self.results;
         assert!(results.len() == *count, "there are {} results, expected {count}", results.len());
-        let mut written = [std::ptr::null_mut(); RESULTS];
+        let mut written = [const { MaybeUninit::uninit() }; RESULTS];
         for ((to, result), len) in written.iter_mut().zip(results.iter_mut()).zip(lengths) {
             assert!(result.len() == *len, "a result has {} entries, expected {len}", result.len());
-            *to = result.as_mut_ptr();
-        }
-        let constants = &self.constants[before_aligned(self.constants.as_ptr())..];
-        let mut read = [constants.as_ptr(); INPUTS + 1];
-        for (to, input) in read.iter_mut().zip(inputs) {
-            *to = input.as_ptr();
+            to.write(result.as_mut_ptr());
         }
         // The length of the working memory includes what is skipped.
         let skipped = before_aligned(scratch.as_ptr());
         let scratch = &mut scratch[skipped..];
         // SAFETY: see the head of this file.
-        unsafe { (self.entry)(read.as_ptr(), written.as_ptr(), scratch.as_mut_ptr()) == 0 }
+        unsafe { (self.entry)(read.as_ptr().cast(), written.as_ptr().cast(), scratch.as_mut_ptr()) == 0 }
     }
 }
 

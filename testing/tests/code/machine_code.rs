@@ -13,6 +13,7 @@ use mbd_codegen::{search, Arithmetic, Options, Output, Precision, RolledCode};
 use mbd_runtime::{
     Accelerated, Conjugate, Constrained, Differentiable, Energetic, Interpreter, Packed, Scalar, System,
 };
+use mbd_testing::chains::general;
 use mbd_testing::closed::{random_loops, LoopKnobs};
 use mbd_testing::conformance::{chain, closed, exact, sampled, tree, Case};
 use mbd_testing::random::{random_model, Distribution};
@@ -243,6 +244,44 @@ fn fast_code_is_as_accurate() {
         let size = a2.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
         let off = a.iter().zip(&a2).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
         assert!(off <= 1e-11 * size, "seed {seed}: {off:e} of {size:e}\n{}", to_toml(&model));
+    }
+}
+
+/// Angles beyond the range of the main path of sine and cosine, alone and among small ones, in straight-line and rolled
+/// code and of like branches: exact code has the bits of the interpreter, and fast code differs by roundings.
+#[test]
+fn large_angles() {
+    let models: Vec<(Model, RolledCode)> = (0..12)
+        .map(|seed| {
+            (random_model(seed, &Distribution { bodies: (2, 9), ..Distribution::default() }), RolledCode::Never)
+        })
+        .chain((0..4).map(|seed| (general(seed, 9), RolledCode::Always)))
+        .collect();
+    for (seed, (model, rolled)) in models.iter().enumerate() {
+        let options = exact(EliminationStrategy::Fastest, *rolled);
+        let plan = search::plan(model, options.plan);
+        let s = random_state(&plan, seed as u64);
+        let fast = Options { arithmetic: Arithmetic::Fast, ..options.clone() };
+        let [mut c, mut f] = [&options, &fast].map(|options| compiled::<f64>(&plan, options, &s));
+        let mut i = s.interpreter(&plan);
+        // Quaternions stay as they are.
+        let angles: Vec<usize> = match i.lie_joints().is_empty() {
+            true => (0..plan.dims.nq).collect(),
+            false => continue,
+        };
+        for k in angles {
+            let mut q = s.q.clone();
+            q[k] = 3.0e6 + 0.1 * k as f64;
+            let [mut a, mut a2, mut a3] = [0; 3].map(|_| zeros(s.v.len()));
+            c.generalized_accelerations(&q, &s.v, &mut a);
+            f.generalized_accelerations(&q, &s.v, &mut a2);
+            i.generalized_accelerations(&q, &s.v, &mut a3);
+            mbd_testing::assert_same_bits("large angles", "accelerations", model, &a, &a3);
+            let size = a3.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+            let off = a2.iter().zip(&a3).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            // As above; a coordinate that is a length of that size makes the inertia worse by its square.
+            assert!(off <= 1e-3 * size, "{seed}: {off:e} of {size:e}\n{}", to_toml(model));
+        }
     }
 }
 

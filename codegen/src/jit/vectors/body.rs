@@ -1,5 +1,11 @@
-//! The body of a function as a list of vector instructions over any number of values.
+//! The body of a function as a list of instructions over any number of values.
 
+mod together;
+
+use std::collections::BTreeMap;
+
+use super::{Lanes, Width};
+use crate::jit::instructions::BLOCK;
 use crate::lower::{limit, main_path, Array, Instructions, Operation, Place};
 use crate::options::Precision;
 
@@ -28,6 +34,8 @@ pub enum Binary {
     AddIntegers,
     /// Of integers.
     SubIntegers,
+    /// The lanes of the first operand, then those of the second one.
+    Join,
 }
 
 /// How a value is computed.
@@ -36,6 +44,10 @@ pub enum Step {
     /// A constant by its bits.
     Constant(u64),
     Load(Entry),
+    /// An entry that is not written again.
+    Again(Entry),
+    /// A single number in all lanes.
+    Broadcast(Id),
     Binary(Binary, Id, Id),
     /// `±a · b ± c`
     Fused {
@@ -66,10 +78,10 @@ impl Step {
     /// The values that are read.
     pub fn operands(&self) -> impl Iterator<Item = Id> {
         let operands = match *self {
-            Step::Constant(_) | Step::Load(_) => [None; 3],
+            Step::Constant(_) | Step::Load(_) | Step::Again(_) => [None; 3],
             Step::Binary(_, a, b) => [Some(a), Some(b), None],
             Step::Fused { a, b, c, .. } => [Some(a), Some(b), Some(c)],
-            Step::Sqrt(a) | Step::Shift(a, _) => [Some(a), None, None],
+            Step::Sqrt(a) | Step::Shift(a, _) | Step::Broadcast(a) => [Some(a), None, None],
             Step::Select { mask, yes, no } => [Some(mask), Some(yes), Some(no)],
             Step::ZeroBelow { value, floor, x } => [Some(value), Some(floor), Some(x)],
         };
@@ -85,6 +97,10 @@ pub enum Item {
     Store(Entry, Id),
     /// The function gives up if the sign of a lane is set.
     ExitIfSigns(Id),
+    /// Sines and cosines are computed by the runtime, if the sign of a lane is set.
+    CallIfSigns(Id, Call),
+    /// The same always. No value keeps its register.
+    Call(Call),
     /// A loop of so many turns begins. No value is read on its other side.
     Open {
         turns: usize,
@@ -95,6 +111,14 @@ pub enum Item {
         turns: usize,
         backward: bool,
     },
+}
+
+/// Arguments of the runtime's function for sines and cosines: angles, sines and cosines of so many, a multiple of
+/// [`BLOCK`](crate::jit::instructions::BLOCK).
+#[derive(Clone, Copy, Debug)]
+pub struct Call {
+    pub n: usize,
+    pub arrays: [Entry; 3],
 }
 
 /// A value as the program has it: the negative of one that is computed costs nothing where it can be a part of what
@@ -108,10 +132,19 @@ pub struct Signed {
 /// A body that is being recorded.
 pub struct Body {
     pub items: Vec<Item>,
-    pub values: Id,
-    /// Number of places for the values that loops carry from turn to turn.
+    /// How many numbers each value has.
+    pub lanes: Vec<Lanes>,
+    /// Number of entries that the body has for itself in [`Array::Spilled`]: for values that loops carry from turn to turn,
+    /// and for parts of vectors.
     pub carried: usize,
     fused: bool,
+    width: Width,
+    /// Numbers in a vector of like branches.
+    branches: usize,
+    /// How many numbers the next value has.
+    now: Lanes,
+    /// Where vectors are whose parts have been asked for.
+    stored: BTreeMap<Id, usize>,
 }
 
 /// A loop that is being recorded: first place of what it carries.
@@ -122,14 +155,28 @@ pub struct Loop {
 }
 
 impl Body {
-    pub fn new(fused: bool) -> Body {
-        Body { items: Vec::new(), values: 0, carried: 0, fused }
+    pub fn new(fused: bool, width: Width, branches: usize) -> Body {
+        let (items, lanes, stored) = (Vec::new(), Vec::new(), BTreeMap::new());
+        Body { items, lanes, carried: 0, fused, width, branches, now: width.states, stored }
     }
 
     fn value(&mut self, step: Step) -> Id {
-        self.items.push(Item::Value(self.values, step));
-        self.values += 1;
-        self.values - 1
+        let id = self.lanes.len() as Id;
+        self.items.push(Item::Value(id, step));
+        self.lanes.push(self.now);
+        id
+    }
+
+    /// The same with another number of lanes.
+    fn value_of(&mut self, lanes: Lanes, step: Step) -> Id {
+        let now = std::mem::replace(&mut self.now, lanes);
+        let id = self.value(step);
+        self.now = now;
+        id
+    }
+
+    fn lanes(&self, id: Id) -> Lanes {
+        self.lanes[id as usize]
     }
 
     fn constant_bits(&mut self, bits: u64) -> Id {
@@ -145,8 +192,9 @@ impl Body {
         if !minus {
             return id;
         }
-        let sign = self.constant_bits(SIGN);
-        self.binary(Binary::Xor, id, sign)
+        let lanes = self.lanes(id);
+        let sign = self.value_of(lanes, Step::Constant(SIGN));
+        self.value_of(lanes, Step::Binary(Binary::Xor, id, sign))
     }
 
     fn sum(&mut self, a: Signed, b: Signed) -> Signed {
@@ -162,8 +210,8 @@ impl Body {
         Signed { id: self.binary(operation, a.id, b.id), minus: a.minus != b.minus }
     }
 
-    /// Sines and cosines of angles, which all have to be within the range of the main path.
-    fn pairs(&mut self, angles: &[Signed]) -> Vec<[Signed; 2]> {
+    /// A value whose signs are set where angles are beyond the range of the main path.
+    fn beyond(&mut self, angles: &[Signed]) -> Option<Id> {
         let (size, limit) = (!SIGN, limit(Precision::F64).to_bits());
         // The bits of doubles without signs have the order of the numbers, and NaN comes last.
         let mut beyond = None;
@@ -173,10 +221,19 @@ impl Body {
             let rest = self.binary(Binary::SubIntegers, limit, size);
             beyond = Some(beyond.map_or(rest, |beyond| self.binary(Binary::Or, beyond, rest)));
         }
+        beyond
+    }
+
+    /// Sines and cosines of angles, which all have to be within the range of the main path.
+    fn pairs(&mut self, angles: &[Signed]) -> Vec<[Signed; 2]> {
+        let beyond = self.beyond(angles);
         self.items.extend(beyond.map(Item::ExitIfSigns));
+        angles.iter().map(|angle| self.pair(*angle)).collect()
+    }
+
+    fn pair(&mut self, angle: Signed) -> [Signed; 2] {
         let fused = self.fused;
-        let pair = |angle: &Signed| main_path(self, *angle, Precision::F64, fused, Body::turned);
-        angles.iter().map(pair).collect()
+        main_path(self, angle, Precision::F64, fused, Body::turned)
     }
 
     /// Exchanges sine and cosine in odd quadrants and gives them the quadrant's signs, by their bits.
@@ -258,16 +315,44 @@ impl Instructions for Body {
 
     fn sines(&mut self, angles: &[Signed]) -> Vec<[Signed; 2]> {
         let angles: Vec<Signed> = angles.iter().map(|a| Signed { id: self.plain(*a), minus: false }).collect();
-        self.pairs(&angles)
+        match self.width.states {
+            Lanes::One => self.sines_of_one(&angles),
+            _ => self.pairs(&angles),
+        }
     }
 
     fn sines_of_array(&mut self, n: usize) {
+        if self.width.states == Lanes::One {
+            let arrays = [Array::Angles, Array::Sines, Array::Cosines].map(|array| Entry { array, at: 0, stride: 0 });
+            self.items.push(Item::Call(Call { n: n.next_multiple_of(BLOCK), arrays }));
+            return;
+        }
         let (open, (), _) = self.open_loop(n, false, Vec::new());
         let angle = self.load(Place::moving(Array::Angles, 0, (), 1));
         for (array, value) in [Array::Sines, Array::Cosines].into_iter().zip(self.pairs(&[angle])[0]) {
             self.store(Place::moving(array, 0, (), 1), value);
         }
         self.close_loop(open, Vec::new());
+    }
+
+    fn width(&self) -> usize {
+        self.branches
+    }
+
+    fn vectors(&mut self, on: bool) {
+        if self.branches > 1 {
+            self.now = if on { Lanes::for_numbers(self.branches, Lanes::Four) } else { self.width.states };
+        }
+    }
+
+    fn vector(&mut self, numbers: &[Signed]) -> Signed {
+        let numbers: Vec<Id> = numbers.iter().map(|x| self.plain(*x)).collect();
+        Signed { id: self.packed(&numbers, self.now), minus: false }
+    }
+
+    fn part(&mut self, vector: &Signed, k: usize) -> Signed {
+        let vector = self.plain(*vector);
+        Signed { id: self.part_of(vector, k), minus: false }
     }
 
     fn open_loop(&mut self, turns: usize, backward: bool, start: Vec<Signed>) -> (Loop, (), Vec<Signed>) {

@@ -1,10 +1,14 @@
-//! Bytes of the x86-64 instructions that vectors of 32 and 64 bytes need: with VEX prefix (AVX2, FMA; 16 registers) or
-//! EVEX prefix (AVX-512; 32 registers).
+//! Bytes of the x86-64 instructions for single doubles and for vectors of them: with VEX prefix (AVX2, FMA; 16 registers)
+//! or EVEX prefix (AVX-512; 32 registers).
 //!
 //! Source: Intel 64 and IA-32 Architectures Software Developer's Manual, volume 2, sections 2.3 (VEX), 2.7 (EVEX) and the
 //! pages of the instructions.
 
-use super::Width;
+use super::Lanes;
+
+mod control;
+
+pub use control::{Jump, Label};
 
 /// A vector register.
 pub type Register = u8;
@@ -56,19 +60,33 @@ pub struct Code {
     byte: u8,
     /// Bit W of the VEX prefix. EVEX instructions on doubles have it always.
     w: bool,
+    /// Prefix and byte of the same instruction for a single number. Where there is none, that for 16 bytes does it.
+    single: Option<(u8, u8)>,
+}
+
+impl Code {
+    /// Whether a single number in memory can be the last operand where the result is a single number.
+    pub fn reads_single(self) -> bool {
+        self.single.is_some()
+    }
 }
 
 const fn code(map: Map, prefix: u8, byte: u8) -> Code {
-    Code { map, prefix, byte, w: false }
+    Code { map, prefix, byte, w: false, single: None }
 }
 
-pub const ADD: Code = code(Map::M0f, 1, 0x58);
-pub const MUL: Code = code(Map::M0f, 1, 0x59);
-pub const SUB: Code = code(Map::M0f, 1, 0x5c);
-pub const DIV: Code = code(Map::M0f, 1, 0x5e);
-pub const SQRT: Code = code(Map::M0f, 1, 0x51);
-pub const LOAD: Code = code(Map::M0f, 1, 0x10);
-pub const STORE: Code = code(Map::M0f, 1, 0x11);
+/// An instruction that has a form for single numbers.
+const fn arithmetic(byte: u8) -> Code {
+    Code { map: Map::M0f, prefix: 1, byte, w: false, single: Some((3, byte)) }
+}
+
+pub const ADD: Code = arithmetic(0x58);
+pub const MUL: Code = arithmetic(0x59);
+pub const SUB: Code = arithmetic(0x5c);
+pub const DIV: Code = arithmetic(0x5e);
+pub const SQRT: Code = arithmetic(0x51);
+pub const LOAD: Code = arithmetic(0x10);
+pub const STORE: Code = arithmetic(0x11);
 pub const COPY: Code = code(Map::M0f, 1, 0x28);
 pub const AND: Code = code(Map::M0f, 1, 0xdb);
 pub const AND_NOT: Code = code(Map::M0f, 1, 0xdf);
@@ -79,6 +97,16 @@ pub const SUB_INTEGERS: Code = code(Map::M0f, 1, 0xfb);
 const SHIFT: Code = code(Map::M0f, 1, 0x73);
 const COMPARE: Code = code(Map::M0f, 1, 0xc2);
 const BROADCAST: Code = code(Map::M0f38, 1, 0x19);
+/// The same into 16 bytes.
+const BROADCAST_TWO: Code = code(Map::M0f, 3, 0x12);
+/// Two numbers beside each other, the second one from a register.
+const JOIN: Code = code(Map::M0f, 1, 0x14);
+/// The same from memory.
+const JOIN_MEMORY: Code = code(Map::M0f, 1, 0x16);
+/// Two vectors of 16 bytes beside each other.
+const JOIN_TWO: Code = code(Map::M0f3a, 1, 0x18);
+/// Two vectors of 32 bytes.
+const JOIN_FOUR: Code = code(Map::M0f3a, 1, 0x1a);
 /// Takes the second operand where the sign of the mask is set (VEX).
 const SELECT: Code = code(Map::M0f3a, 1, 0x4b);
 /// Takes the second operand where the mask is set (EVEX).
@@ -102,7 +130,8 @@ pub enum Order {
 /// A fused product with the signs of product and addend.
 pub fn fused(order: Order, minus_product: bool, minus_addend: bool) -> Code {
     let sign = 8 + 2 * u8::from(minus_addend) + 4 * u8::from(minus_product);
-    Code { map: Map::M0f38, prefix: 1, byte: order as u8 + sign, w: true }
+    let byte = order as u8 + sign;
+    Code { map: Map::M0f38, prefix: 1, byte, w: true, single: Some((1, byte + 1)) }
 }
 
 /// Predicates of comparisons.
@@ -114,67 +143,129 @@ pub enum Predicate {
     NotLessOrEqual = 0x16,
 }
 
-/// A place in the code to which jumps lead.
-#[derive(Clone, Copy, Debug)]
-pub struct Label(usize);
-
 /// Machine code that is being written.
 pub struct Assembler {
-    width: Width,
+    /// Whether the processor has AVX-512.
+    wide: bool,
     bytes: Vec<u8>,
-    /// Places of the four bytes of forward jumps that lead to the exit.
-    exits: Vec<usize>,
+    /// Forward jumps that lead to the exit.
+    exits: Vec<Jump>,
+    /// Whether registers were written beyond their first 16 bytes.
+    upper: bool,
+}
+
+/// An instruction with its operands.
+#[derive(Clone, Copy)]
+struct Instruction {
+    lanes: Lanes,
+    code: Code,
+    reg: u8,
+    v: u8,
+    last: Last,
+    /// A mask register (EVEX), and whether its zeros zero the result.
+    mask: Option<(u8, bool)>,
+    /// Bytes that it reads or writes in memory.
+    bytes: i32,
 }
 
 impl Assembler {
-    pub fn new(width: Width) -> Assembler {
-        Assembler { width, bytes: Vec::new(), exits: Vec::new() }
-    }
-
-    fn evex(&self) -> bool {
-        self.width == Width::Eight
+    pub fn new(wide: bool) -> Assembler {
+        Assembler { wide, bytes: Vec::new(), exits: Vec::new(), upper: false }
     }
 
     /// `to = code(a, last)`; instructions of two operands have no `a`.
-    pub fn vector(&mut self, code: Code, to: Register, a: Option<Register>, last: Last) {
-        self.prefixed(code, to, a.unwrap_or(0), last, 0, false);
+    pub fn vector(&mut self, lanes: Lanes, code: Code, to: Register, a: Option<Register>, last: Last) {
+        let bytes = match last {
+            Last::Memory(Address { broadcast: true, .. }) => 8,
+            _ if lanes == Lanes::One && code.single.is_none() => 16,
+            _ => lanes.bytes(),
+        };
+        self.write(Instruction { lanes, code, reg: to, v: a.unwrap_or(0), last, mask: None, bytes });
     }
 
-    /// The same with a byte at the end.
-    fn with_byte(&mut self, code: Code, to: Register, a: Register, last: Last, byte: u8) {
-        self.prefixed(code, to, a, last, 0, false);
+    /// The same with a byte at the end, of registers.
+    fn with_byte(&mut self, lanes: Lanes, code: Code, [to, a, last]: [Register; 3], byte: u8) {
+        self.vector(lanes, code, to, Some(a), Last::Register(last));
         self.bytes.push(byte);
     }
 
-    /// Prefix, code and operands. `mask` is the number of a mask register (EVEX), whose zeros zero the result if `zero`.
-    fn prefixed(&mut self, code: Code, reg: u8, v: u8, last: Last, mask: u8, zero: bool) {
+    /// With a mask register (EVEX), of registers.
+    fn masked(&mut self, lanes: Lanes, code: Code, [to, a, last]: [Register; 3], mask: (u8, bool)) {
+        let last = Last::Register(last);
+        self.write(Instruction { lanes, code, reg: to, v: a, last, mask: Some(mask), bytes: 0 });
+    }
+
+    /// Prefix, code and operands.
+    fn write(&mut self, i: Instruction) {
+        let (prefix, byte) = match i.code.single {
+            Some(single) if i.lanes == Lanes::One => single,
+            _ => (i.code.prefix, i.code.byte),
+        };
+        self.upper |= i.lanes > Lanes::Two;
+        let evex = self.evex(&i);
+        if evex {
+            self.evex_prefix(&i, prefix);
+        } else {
+            self.vex_prefix(&i, prefix);
+        }
+        self.bytes.push(byte);
+        match i.last {
+            Last::Register(rm) => self.bytes.push(0xc0 | (i.reg & 7) << 3 | (rm & 7)),
+            Last::Memory(address) => self.address(i.reg, address, if evex { i.bytes } else { 1 }),
+        }
+    }
+
+    /// Whether an instruction needs the prefix of AVX-512, or is shorter with it.
+    fn evex(&self, i: &Instruction) -> bool {
+        let far = |r: u8| r >= 16;
+        let needed = match i.last {
+            Last::Register(r) => far(r),
+            Last::Memory(m) => m.broadcast && !matches!(i.code.byte, 0x12 | 0x19),
+        };
+        let shorter = match i.last {
+            // Distances of one byte count in units.
+            Last::Memory(m) => {
+                let unit = m.offset % i.bytes == 0 && i8::try_from(m.offset / i.bytes).is_ok();
+                unit && i8::try_from(m.offset).is_err()
+            }
+            Last::Register(_) => false,
+        };
+        let needed = needed || i.mask.is_some() || i.lanes == Lanes::Eight || far(i.reg) || far(i.v);
+        self.wide && (needed || shorter)
+    }
+
+    fn evex_prefix(&mut self, i: &Instruction, prefix: u8) {
         // The bits that extend the numbers of registers are stored inverted.
-        let (x, b) = match last {
+        let (x, b) = match i.last {
             Last::Register(r) => (r >> 4 & 1, r >> 3 & 1),
             Last::Memory(m) => (m.index.map_or(0, |i| i as u8 >> 3), m.base as u8 >> 3),
         };
-        let (r, r2) = (reg >> 3 & 1, reg >> 4 & 1);
-        let low = |v: u8| (!v & 15) << 3;
-        if self.evex() {
-            let broadcast =
-                matches!(last, Last::Memory(Address { broadcast: true, .. })) && code.byte != BROADCAST.byte;
-            let first = (1 - r) << 7 | (1 - x) << 6 | (1 - b) << 5 | (1 - r2) << 4 | code.map as u8;
-            let second = 1 << 7 | low(v) | 1 << 2 | code.prefix;
-            let third = u8::from(zero) << 7 | 2 << 5 | u8::from(broadcast) << 4 | (1 - (v >> 4)) << 3 | mask;
-            self.bytes.extend([0x62, first, second, third]);
-        } else if x == 0 && b == 0 && !code.w && matches!(code.map, Map::M0f) {
-            self.bytes.extend([0xc5, (1 - r) << 7 | low(v) | 1 << 2 | code.prefix]);
+        let (r, r2) = (i.reg >> 3 & 1, i.reg >> 4 & 1);
+        let broadcast = matches!(i.last, Last::Memory(m) if m.broadcast) && !matches!(i.code.byte, 0x12 | 0x19);
+        let length = match i.lanes {
+            Lanes::One | Lanes::Two => 0,
+            Lanes::Four => 1,
+            Lanes::Eight => 2,
+        };
+        let (mask, zero) = i.mask.unwrap_or((0, false));
+        let first = (1 - r) << 7 | (1 - x) << 6 | (1 - b) << 5 | (1 - r2) << 4 | i.code.map as u8;
+        let second = 1 << 7 | (!i.v & 15) << 3 | 1 << 2 | prefix;
+        let third = u8::from(zero) << 7 | length << 5 | u8::from(broadcast) << 4 | (1 - (i.v >> 4)) << 3 | mask;
+        self.bytes.extend([0x62, first, second, third]);
+    }
+
+    fn vex_prefix(&mut self, i: &Instruction, prefix: u8) {
+        let (x, b) = match i.last {
+            Last::Register(r) => (0, r >> 3 & 1),
+            Last::Memory(m) => (m.index.map_or(0, |i| i as u8 >> 3), m.base as u8 >> 3),
+        };
+        let r = i.reg >> 3 & 1;
+        let rest = (!i.v & 15) << 3 | u8::from(i.lanes == Lanes::Four) << 2 | prefix;
+        if x == 0 && b == 0 && !i.code.w && matches!(i.code.map, Map::M0f) {
+            self.bytes.extend([0xc5, (1 - r) << 7 | rest]);
         } else {
-            let first = (1 - r) << 7 | (1 - (x & 1)) << 6 | (1 - b) << 5 | code.map as u8;
-            self.bytes.extend([0xc4, first, u8::from(code.w) << 7 | low(v) | 1 << 2 | code.prefix]);
-        }
-        self.bytes.push(code.byte);
-        match last {
-            Last::Register(rm) => self.bytes.push(0xc0 | (reg & 7) << 3 | (rm & 7)),
-            Last::Memory(address) => {
-                let whole = if address.broadcast { 8 } else { self.width.bytes() };
-                self.address(reg, address, if self.evex() { whole } else { 1 });
-            }
+            let first = (1 - r) << 7 | (1 - x) << 6 | (1 - b) << 5 | i.code.map as u8;
+            self.bytes.extend([0xc4, first, u8::from(i.code.w) << 7 | rest]);
         }
     }
 
@@ -200,108 +291,50 @@ impl Assembler {
         }
     }
 
-    /// Reads one number into all lanes.
-    pub fn broadcast(&mut self, to: Register, address: Address) {
-        self.vector(BROADCAST, to, None, Last::Memory(Address { broadcast: true, ..address }));
+    /// A single number in all lanes.
+    pub fn broadcast(&mut self, lanes: Lanes, to: Register, last: Last) {
+        let code = if lanes == Lanes::Two { BROADCAST_TWO } else { BROADCAST };
+        self.write(Instruction { lanes, code, reg: to, v: 0, last, mask: None, bytes: 8 });
+    }
+
+    /// The lanes of `a` and then those of the last operand, which is a register where these are more than one.
+    pub fn join(&mut self, lanes: Lanes, to: Register, a: Register, last: Last) {
+        match (lanes, last) {
+            (Lanes::Four | Lanes::Eight, _) => {
+                let code = if lanes == Lanes::Four { JOIN_TWO } else { JOIN_FOUR };
+                self.vector(lanes, code, to, Some(a), last);
+                self.bytes.push(1);
+            }
+            (_, Last::Register(_)) => self.vector(lanes, JOIN, to, Some(a), last),
+            _ => self.write(Instruction { lanes, code: JOIN_MEMORY, reg: to, v: a, last, mask: None, bytes: 8 }),
+        }
     }
 
     /// `to = from << by`, as integers of 64 bits.
-    pub fn shift_left(&mut self, to: Register, from: Register, by: u8) {
-        self.with_byte(SHIFT, 6, to, Last::Register(from), by);
+    pub fn shift_left(&mut self, lanes: Lanes, to: Register, from: Register, by: u8) {
+        self.with_byte(lanes, SHIFT, [6, to, from], by);
     }
 
     /// `to = if the sign of mask is set { yes } else { no }`, lane by lane.
-    pub fn select(&mut self, to: Register, mask: Register, yes: Register, no: Register) {
-        if self.evex() {
-            self.prefixed(SIGNS_TO_MASK, 1, 0, Last::Register(mask), 0, false);
-            self.prefixed(SELECT_BY_MASK, to, no, Last::Register(yes), 1, false);
+    pub fn select(&mut self, lanes: Lanes, to: Register, mask: Register, yes: Register, no: Register) {
+        if self.wide {
+            self.masked(lanes, SIGNS_TO_MASK, [1, 0, mask], (0, false));
+            self.masked(lanes, SELECT_BY_MASK, [to, no, yes], (1, false));
         } else {
-            self.with_byte(SELECT, to, no, Last::Register(yes), mask << 4);
+            self.with_byte(lanes, SELECT, [to, no, yes], mask << 4);
         }
     }
 
     /// `to = if value <= floor { 0 } else { x }`, lane by lane; `to` is none of the others.
-    pub fn zero_below(&mut self, to: Register, value: Register, floor: Register, x: Register) {
-        if self.evex() {
-            self.with_byte(COMPARE, 1, value, Last::Register(floor), Predicate::NotLessOrEqual as u8);
-            self.prefixed(COPY, to, 0, Last::Register(x), 1, true);
+    pub fn zero_below(&mut self, lanes: Lanes, to: Register, [value, floor, x]: [Register; 3]) {
+        if self.wide {
+            self.masked(lanes, COMPARE, [1, value, floor], (0, false));
+            self.bytes.push(Predicate::NotLessOrEqual as u8);
+            self.masked(lanes, COPY, [to, 0, x], (1, true));
         } else {
-            self.with_byte(COMPARE, to, value, Last::Register(floor), Predicate::LessOrEqual as u8);
-            self.vector(AND_NOT, to, Some(to), Last::Register(x));
+            self.with_byte(lanes, COMPARE, [to, value, floor], Predicate::LessOrEqual as u8);
+            self.vector(lanes, AND_NOT, to, Some(to), Last::Register(x));
         }
-    }
-
-    /// Goes to the exit if the sign of a lane is set. Changes `r10`.
-    pub fn exit_if_signs(&mut self, x: Register) {
-        if self.evex() {
-            self.prefixed(SIGNS_TO_MASK, 1, 0, Last::Register(x), 0, false);
-            // kmovw r10d, k1
-            self.bytes.extend([0xc5, 0x78, 0x93, 0xd1]);
-        } else {
-            self.prefixed(SIGNS, General::R10 as u8, 0, Last::Register(x), 0, false);
-        }
-        // test r10b, all lanes: a mask of eight, or of four.
-        self.bytes.extend([0x41, 0xf6, 0xc2, ((1_u16 << self.width.lanes()) - 1) as u8]);
-        // jnz
-        self.bytes.extend([0x0f, 0x85]);
-        self.exits.push(self.bytes.len());
-        self.bytes.extend([0; 4]);
-    }
-
-    /// Reads an address: `to = [base + offset]`.
-    pub fn read_address(&mut self, to: General, base: General, offset: i32) {
-        self.bytes.extend([0x48 | (to as u8 >> 3) << 2 | base as u8 >> 3, 0x8b]);
-        self.address(to as u8, Address { base, index: None, offset, broadcast: false }, 1);
-    }
-
-    /// `to = x`
-    pub fn set(&mut self, to: General, x: u64) {
-        self.bytes.extend([0x48 | to as u8 >> 3, 0xb8 | (to as u8 & 7)]);
-        self.bytes.extend(x.to_le_bytes());
-    }
-
-    /// `to = from · by`
-    pub fn multiply(&mut self, to: General, from: General, by: i32) {
-        let (to, from) = (to as u8, from as u8);
-        self.bytes.extend([0x48 | (to >> 3) << 2 | from >> 3, 0x69, 0xc0 | (to & 7) << 3 | (from & 7)]);
-        self.bytes.extend(by.to_le_bytes());
-    }
-
-    /// `to = to + by`, and the flags of it.
-    pub fn add(&mut self, to: General, by: i32) {
-        self.bytes.extend([0x48 | to as u8 >> 3, 0x81, 0xc0 | (to as u8 & 7)]);
-        self.bytes.extend(by.to_le_bytes());
-    }
-
-    fn compare(&mut self, a: General, with: i32) {
-        self.bytes.extend([0x48 | a as u8 >> 3, 0x81, 0xf8 | (a as u8 & 7)]);
-        self.bytes.extend(with.to_le_bytes());
-    }
-
-    /// The place that comes next.
-    pub fn here(&self) -> Label {
-        Label(self.bytes.len())
-    }
-
-    /// Goes back to a label unless a register has reached a number.
-    pub fn back_unless(&mut self, a: General, reached: i32, to: Label) {
-        self.compare(a, reached);
-        self.bytes.extend([0x0f, 0x85]);
-        let distance = to.0 as i64 - (self.bytes.len() as i64 + 4);
-        self.bytes.extend(i32::try_from(distance).expect("loops are short").to_le_bytes());
-    }
-
-    /// Ends the function: it returns 0, and 1 from its exits.
-    pub fn finish(mut self) -> Vec<u8> {
-        // xor eax, eax; vzeroupper; ret
-        self.bytes.extend([0x31, 0xc0, 0xc5, 0xf8, 0x77, 0xc3]);
-        for at in std::mem::take(&mut self.exits) {
-            let distance = i32::try_from(self.bytes.len() - (at + 4)).expect("functions are short");
-            self.bytes[at..at + 4].copy_from_slice(&distance.to_le_bytes());
-        }
-        // mov eax, 1; vzeroupper; ret
-        self.bytes.extend([0xb8, 1, 0, 0, 0, 0xc5, 0xf8, 0x77, 0xc3]);
-        self.bytes
     }
 }
 

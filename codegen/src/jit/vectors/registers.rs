@@ -3,13 +3,14 @@
 //! The value whose next use is the farthest leaves the registers (Belady, 1966). Constants, inputs and tables are read
 //! again from where they are; other values are stored once. The last operand of an instruction may be in memory.
 
+mod calls;
 mod places;
 
 use std::collections::BTreeMap;
 
-use super::body::{Binary, Body, Entry, Id, Item, Step};
-use super::encode::{self as code, fused, Assembler, General, Label, Last, Order, Register};
-use super::Width;
+use super::body::{Binary, Body, Call, Entry, Id, Item, Step};
+use super::encode::{self as code, fused, Assembler, General, Jump, Label, Last, Order, Register};
+use super::{Lanes, Width};
 use crate::lower::{Array, Memory};
 
 /// Registers for addresses of arrays.
@@ -31,20 +32,23 @@ pub struct Arrays<'a> {
     pub constants: usize,
     /// Working memory.
     pub memory: &'a Memory,
+    /// Address of the function for sines and cosines.
+    pub sines: u64,
 }
 
 /// Machine code of a body.
 pub struct Written {
     pub bytes: Vec<u8>,
-    /// Entries of the working memory, each as wide as a vector.
+    /// Entries of the working memory, each with a number of every state.
     pub scratch: usize,
     /// Numbers that the code reads: constants, as vectors where it reads whole ones.
     pub numbers: Vec<f64>,
 }
 
 /// What is known of a value.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 struct Known {
+    lanes: Lanes,
     register: Option<Register>,
     /// Place among those for values that left the registers.
     slot: Option<usize>,
@@ -66,14 +70,24 @@ struct Writer<'a> {
     assembler: Assembler,
     width: Width,
     arrays: &'a Arrays<'a>,
-    /// First place for values that left the registers.
+    /// First entry that the body has for itself.
+    own: usize,
+    /// First entry for values that left the registers.
     first_slot: usize,
     known: Vec<Known>,
     /// The value in each register.
     held: Vec<Option<Id>>,
-    free_slots: Vec<usize>,
+    /// Places that are free, by the logarithms of their lengths.
+    free_slots: [Vec<usize>; 4],
     slots: usize,
-    constants: BTreeMap<u64, usize>,
+    /// Number of places that are taken.
+    taken: usize,
+    /// Places of constants, by their bits and the number of copies.
+    constants: BTreeMap<(u64, usize), usize>,
+    /// Numbers in the table of constants.
+    numbers: usize,
+    /// Calls at the end of the code.
+    calls: Vec<FarCall>,
     /// Arrays whose addresses are in [`POINTERS`], and when they were used last.
     pointers: [(Option<Pointer>, usize); POINTERS.len()],
     /// By how many bytes the entries move that [`DISTANCE`] belongs to.
@@ -84,28 +98,44 @@ struct Writer<'a> {
     now: usize,
 }
 
+/// A call that is needed rarely: the jump to it, the place after it, and the registers that hold values.
+struct FarCall {
+    from: Jump,
+    back: Label,
+    held: Vec<(Register, Lanes)>,
+    call: Call,
+}
+
 /// Writes a body. `None` if it is too long for the instructions' distances, or a loop reads a value from outside.
 pub fn write(body: &Body, width: Width, arrays: &Arrays) -> Option<Written> {
-    let mut known = vec![Known::default(); body.values as usize];
+    let new = |lanes: &Lanes| Known { lanes: *lanes, register: None, slot: None, source: None, uses: Vec::new() };
+    let mut known: Vec<Known> = body.lanes.iter().map(new).collect();
     for (k, item) in body.items.iter().enumerate().rev() {
         match item {
             Item::Value(id, _) if known[*id as usize].uses.is_empty() => {}
             Item::Value(_, step) => step.operands().for_each(|id| known[id as usize].uses.push(k)),
-            Item::Store(_, id) | Item::ExitIfSigns(id) => known[*id as usize].uses.push(k),
-            Item::Open { .. } | Item::Close { .. } => {}
+            Item::Store(_, id) | Item::ExitIfSigns(id) | Item::CallIfSigns(id, _) => known[*id as usize].uses.push(k),
+            Item::Open { .. } | Item::Close { .. } | Item::Call(_) => {}
         }
     }
-    let first_slot = arrays.memory.len() + body.carried;
+    // Vectors of one state begin at multiples of their lengths.
+    let aligned = |at: usize| if width.states == Lanes::One { at.next_multiple_of(Lanes::Eight.count()) } else { at };
+    let own = aligned(arrays.memory.len());
+    let first_slot = aligned(own + body.carried);
     let mut writer = Writer {
-        assembler: Assembler::new(width),
+        assembler: Assembler::new(width.wide),
         width,
         arrays,
+        own,
         first_slot,
         known,
         held: vec![None; width.registers()],
-        free_slots: Vec::new(),
+        free_slots: Default::default(),
         slots: 0,
+        taken: 0,
         constants: BTreeMap::new(),
+        numbers: 0,
+        calls: Vec::new(),
         pointers: [(None, 0); POINTERS.len()],
         distance: None,
         loops: Vec::new(),
@@ -115,14 +145,13 @@ pub fn write(body: &Body, width: Width, arrays: &Arrays) -> Option<Written> {
         writer.now = k;
         writer.item(*item)?;
     }
-    let mut constants: Vec<(u64, usize)> = writer.constants.into_iter().collect();
-    constants.sort_by_key(|(_, at)| *at);
-    let copies = width.copies();
-    Some(Written {
-        bytes: writer.assembler.finish(),
-        scratch: first_slot + writer.slots,
-        numbers: constants.into_iter().flat_map(|(bits, _)| vec![f64::from_bits(bits); copies]).collect(),
-    })
+    writer.assembler.return_0();
+    writer.write_calls()?;
+    let mut numbers = vec![0.0; writer.numbers];
+    for ((bits, copies), at) in writer.constants {
+        numbers[at..at + copies].fill(f64::from_bits(bits));
+    }
+    Some(Written { bytes: writer.assembler.finish(), scratch: first_slot + writer.slots, numbers })
 }
 
 impl Writer<'_> {
@@ -133,19 +162,21 @@ impl Writer<'_> {
             Item::Store(entry, id) => {
                 let from = self.in_register(id, &[])?;
                 let address = self.entry(entry)?;
-                self.assembler.vector(code::STORE, from, None, Last::Memory(address));
+                self.assembler.vector(self.lanes(id), code::STORE, from, None, Last::Memory(address));
                 self.used([id]);
                 self.forget_slots([id]);
                 Some(())
             }
             Item::ExitIfSigns(id) => {
                 let x = self.in_register(id, &[])?;
-                self.assembler.exit_if_signs(x);
+                self.assembler.exit_if_signs(self.lanes(id), x);
                 self.distance = None;
                 self.used([id]);
                 self.forget_slots([id]);
                 Some(())
             }
+            Item::CallIfSigns(id, call) => self.call_if_signs(id, call),
+            Item::Call(call) => self.call(call),
             Item::Open { turns, backward } => {
                 let first = if backward { turns as u64 - 1 } else { 0 };
                 self.assembler.set(TURN, first);
@@ -173,21 +204,19 @@ impl Writer<'_> {
                 return None;
             }
         }
-        if self.free_slots.len() != self.slots {
+        if self.taken > 0 {
             return None;
         }
-        for id in std::mem::take(&mut self.held).into_iter().flatten() {
-            self.known[id as usize].register = None;
-        }
-        self.held = vec![None; self.width.registers()];
+        self.forget_registers();
         self.pointers = [(None, 0); POINTERS.len()];
         self.distance = None;
         Some(())
     }
 
     fn value(&mut self, id: Id, step: Step) -> Option<()> {
+        let lanes = self.lanes(id);
         match step {
-            Step::Constant(_) | Step::Load(Entry { array: Array::Input(_) | Array::Table(_), .. }) => {
+            Step::Constant(_) | Step::Again(_) | Step::Load(Entry { array: Array::Input(_) | Array::Table(_), .. }) => {
                 // It is read where it is used.
                 self.known[id as usize].source = Some(step);
                 return Some(());
@@ -195,7 +224,7 @@ impl Writer<'_> {
             Step::Load(entry) => {
                 let to = self.register(&[])?;
                 let address = self.entry(entry)?;
-                self.assembler.vector(code::LOAD, to, None, Last::Memory(address));
+                self.assembler.vector(lanes, code::LOAD, to, None, Last::Memory(address));
                 self.hold(id, to);
                 return Some(());
             }
@@ -204,27 +233,36 @@ impl Writer<'_> {
                 self.fused(id, [a, b, c], [minus_product, minus_addend])?;
             }
             Step::Sqrt(a) => {
+                // The root of a single number leaves the rest of its register as it is in another one.
+                let single = lanes == Lanes::One;
+                let last = if single { Last::Register(self.in_register(a, &[])?) } else { self.last(a, &[])? };
+                let to = self.result([a])?;
+                let rest = if let (Last::Register(from), true) = (last, single) { Some(from) } else { None };
+                self.assembler.vector(lanes, code::SQRT, to, rest, last);
+                self.hold(id, to);
+            }
+            Step::Broadcast(a) => {
                 let last = self.last(a, &[])?;
                 let to = self.result([a])?;
-                self.assembler.vector(code::SQRT, to, None, last);
+                self.assembler.broadcast(lanes, to, last);
                 self.hold(id, to);
             }
             Step::Shift(a, by) => {
                 let from = self.in_register(a, &[])?;
                 let to = self.result([a])?;
-                self.assembler.shift_left(to, from, by);
+                self.assembler.shift_left(lanes, to, from, by);
                 self.hold(id, to);
             }
             Step::Select { mask, yes, no } => {
                 let [mask_, yes_, no_] = self.all_in_registers([mask, yes, no])?;
                 let to = self.result([mask, yes, no])?;
-                self.assembler.select(to, mask_, yes_, no_);
+                self.assembler.select(lanes, to, mask_, yes_, no_);
                 self.hold(id, to);
             }
             Step::ZeroBelow { value, floor, x } => {
                 let [value_, floor_, x_] = self.all_in_registers([value, floor, x])?;
                 let to = self.register(&[value_, floor_, x_])?;
-                self.assembler.zero_below(to, value_, floor_, x_);
+                self.assembler.zero_below(lanes, to, [value_, floor_, x_]);
                 self.used([value, floor, x]);
                 self.hold(id, to);
             }
@@ -234,33 +272,40 @@ impl Writer<'_> {
     }
 
     fn binary(&mut self, id: Id, operation: Binary, a: Id, b: Id) -> Option<()> {
-        use Binary::*;
-        let commutes = !matches!(operation, Sub | Div | SubIntegers);
+        use Binary::{Div, Join, Sub, SubIntegers};
+        let commutes = !matches!(operation, Sub | Div | SubIntegers | Join);
         let inside = |id: Id| self.known[id as usize].register.is_some();
         let (a, b) = if commutes && inside(b) && !inside(a) { (b, a) } else { (a, b) };
         let keep: Vec<Register> = self.known[b as usize].register.into_iter().collect();
         let first = self.in_register(a, &keep)?;
-        let last = self.last(b, &[first])?;
-        let to = self.result([a, b])?;
-        let code = match operation {
-            Add => code::ADD,
-            Sub => code::SUB,
-            Mul => code::MUL,
-            Div => code::DIV,
-            And => code::AND,
-            Or => code::OR,
-            Xor => code::XOR,
-            AddIntegers => code::ADD_INTEGERS,
-            SubIntegers => code::SUB_INTEGERS,
+        let (lanes, code) = (self.lanes(id), code_of(operation));
+        let whole = match code {
+            // Only single numbers are joined from memory.
+            None => self.lanes(b) > Lanes::One,
+            // Others read 16 bytes, or one number for all lanes.
+            Some(code) => lanes == Lanes::One && !code.reads_single() && !self.width.wide,
         };
-        self.assembler.vector(code, to, Some(first), last);
+        let mut last = match whole {
+            true => Last::Register(self.in_register(b, &[first])?),
+            false => self.last(b, &[first])?,
+        };
+        let to = self.result([a, b])?;
+        match code {
+            None => self.assembler.join(lanes, to, first, last),
+            Some(code) => {
+                if let (Last::Memory(address), true) = (&mut last, lanes == Lanes::One) {
+                    address.broadcast |= !code.reads_single();
+                }
+                self.assembler.vector(lanes, code, to, Some(first), last);
+            }
+        }
         self.hold(id, to);
         Some(())
     }
 
     /// One of the operands is replaced by the result: one that is not used again, or a copy.
     fn fused(&mut self, id: Id, operands: [Id; 3], [minus_product, minus_addend]: [bool; 2]) -> Option<()> {
-        let [a, b, c] = operands;
+        let ([a, b, c], lanes) = (operands, self.lanes(id));
         let outside = |id: Id| self.known[id as usize].register.is_none();
         let alone = |id: Id| operands.iter().filter(|other| **other == id).count() == 1;
         // The one that stays in memory: not one that is used again soon.
@@ -285,7 +330,7 @@ impl Writer<'_> {
         let mut first = registers[replaced];
         if !dies(operands[replaced]) {
             let to = self.register(&keep)?;
-            self.assembler.vector(code::COPY, to, None, Last::Register(first));
+            self.assembler.vector(lanes, code::COPY, to, None, Last::Register(first));
             first = to;
         }
         let place = |k: usize| match address {
@@ -303,9 +348,25 @@ impl Writer<'_> {
                 }
             }
         };
-        self.assembler.vector(fused(order, minus_product, minus_addend), first, Some(second), last);
+        self.assembler.vector(lanes, fused(order, minus_product, minus_addend), first, Some(second), last);
         self.used([a, b, c]);
         self.hold(id, first);
         Some(())
     }
+}
+
+/// The instruction of an operation; `None` for joins.
+fn code_of(operation: Binary) -> Option<code::Code> {
+    Some(match operation {
+        Binary::Add => code::ADD,
+        Binary::Sub => code::SUB,
+        Binary::Mul => code::MUL,
+        Binary::Div => code::DIV,
+        Binary::And => code::AND,
+        Binary::Or => code::OR,
+        Binary::Xor => code::XOR,
+        Binary::AddIntegers => code::ADD_INTEGERS,
+        Binary::SubIntegers => code::SUB_INTEGERS,
+        Binary::Join => return None,
+    })
 }

@@ -3,7 +3,7 @@
 use super::{Known, Pointer, Writer, DISTANCE, POINTERS, TURN};
 use crate::jit::vectors::body::{Entry, Id, Step};
 use crate::jit::vectors::encode::{self as code, Address, General, Last, Register};
-use crate::jit::vectors::Width;
+use crate::jit::vectors::Lanes;
 use crate::lower::Array;
 
 /// A value that is used again within so many instructions is read into a register.
@@ -19,10 +19,15 @@ impl Writer<'_> {
         self.next_use_after_now(id).is_some_and(|k| k <= self.now + SOON)
     }
 
+    /// How many numbers a value has.
+    pub(super) fn lanes(&self, id: Id) -> Lanes {
+        self.known[id as usize].lanes
+    }
+
     /// Whether an instruction can read the value from memory.
     pub(super) fn readable(&self, id: Id) -> bool {
         let table = matches!(self.known[id as usize].source, Some(Step::Load(Entry { array: Array::Table(_), .. })));
-        self.width == Width::Eight || !table
+        self.width.wide || self.width.states == Lanes::One || !table
     }
 
     /// The value as the last operand of an instruction.
@@ -53,9 +58,10 @@ impl Writer<'_> {
         }
         let address = self.memory(id)?;
         let to = self.register(keep)?;
+        let lanes = self.lanes(id);
         match address.broadcast {
-            true => self.assembler.broadcast(to, address),
-            false => self.assembler.vector(code::LOAD, to, None, Last::Memory(address)),
+            true => self.assembler.broadcast(lanes, to, Last::Memory(address)),
+            false => self.assembler.vector(lanes, code::LOAD, to, None, Last::Memory(address)),
         }
         self.hold(id, to);
         Some(to)
@@ -92,7 +98,10 @@ impl Writer<'_> {
         for id in operands {
             let known = &mut self.known[id as usize];
             if known.uses.is_empty() {
-                self.free_slots.extend(known.slot.take());
+                if let Some(slot) = known.slot.take() {
+                    self.free_slots[known.lanes.count().ilog2() as usize].push(slot);
+                    self.taken -= 1;
+                }
             }
         }
     }
@@ -111,19 +120,28 @@ impl Writer<'_> {
         };
         let candidates = (0..self.held.len()).filter(|register| !keep.contains(&(*register as Register)));
         let farthest = candidates.max_by_key(distance)?;
-        let id = self.held[farthest].take()?;
-        let Known { slot, source, .. } = &self.known[id as usize];
+        self.leave(farthest as Register)?;
+        Some(farthest as Register)
+    }
+
+    /// The value of a register leaves it, and is stored if it can be had nowhere else.
+    pub(super) fn leave(&mut self, register: Register) -> Option<()> {
+        let Some(id) = self.held[register as usize].take() else { return Some(()) };
+        let Known { slot, source, lanes, .. } = self.known[id as usize];
         if slot.is_none() && source.is_none() {
-            let slot = self.free_slots.pop().unwrap_or_else(|| {
-                self.slots += 1;
-                self.slots - 1
+            let slot = self.free_slots[lanes.count().ilog2() as usize].pop().unwrap_or_else(|| {
+                let entries = if self.width.states == Lanes::One { lanes.count() } else { 1 };
+                let at = self.slots.next_multiple_of(entries);
+                self.slots = at + entries;
+                at
             });
+            self.taken += 1;
             let address = self.slot(slot)?;
-            self.assembler.vector(code::STORE, farthest as Register, None, Last::Memory(address));
+            self.assembler.vector(lanes, code::STORE, register, None, Last::Memory(address));
             self.known[id as usize].slot = Some(slot);
         }
         self.known[id as usize].register = None;
-        Some(farthest as Register)
+        Some(())
     }
 
     /// Where a value is that has no register.
@@ -131,30 +149,37 @@ impl Writer<'_> {
         match (self.known[id as usize].slot, self.known[id as usize].source) {
             (Some(slot), _) => self.slot(slot),
             (None, Some(Step::Constant(bits))) => {
-                let next = self.constants.len();
-                let at = *self.constants.entry(bits).or_insert(next);
-                let (copies, base) = (self.width.copies(), self.pointer(Pointer::Numbers)?);
-                let offset = offset(self.arrays.constants + at * copies, 8)?;
-                Some(Address { base, index: None, offset, broadcast: copies == 1 })
+                let lanes = self.lanes(id);
+                let copies = self.width.copies(lanes);
+                let numbers = &mut self.numbers;
+                let at = *self.constants.entry((bits, copies)).or_insert_with(|| {
+                    let at = numbers.next_multiple_of(copies);
+                    *numbers = at + copies;
+                    at
+                });
+                let base = self.pointer(Pointer::Numbers)?;
+                let offset = offset(self.arrays.constants + at, 8)?;
+                Some(Address { base, index: None, offset, broadcast: copies < lanes.count() })
             }
-            (None, Some(Step::Load(entry))) => self.entry(entry),
+            (None, Some(Step::Load(entry) | Step::Again(entry))) => self.entry(entry),
             _ => None,
         }
     }
 
     pub(super) fn slot(&self, slot: usize) -> Option<Address> {
-        let offset = offset(self.first_slot + slot, self.width.bytes())?;
+        let offset = offset(self.first_slot + slot, self.width.states.bytes())?;
         Some(Address { base: General::Rdx, index: None, offset, broadcast: false })
     }
 
     pub(super) fn entry(&mut self, Entry { array, at, stride }: Entry) -> Option<Address> {
-        let broadcast = matches!(array, Array::Table(_));
-        let size = if broadcast { 8 } else { self.width.bytes() };
+        let one_for_all = matches!(array, Array::Table(_));
+        let size = if one_for_all { 8 } else { self.width.states.bytes() };
+        let broadcast = one_for_all && self.width.states != Lanes::One;
         let memory = self.arrays.memory;
         let (base, first) = match array {
             Array::Input(_) | Array::Result(_) => (self.pointer(Pointer::Array(array))?, 0),
             Array::Table(run) => (self.pointer(Pointer::Numbers)?, *self.arrays.tables.get(run)?),
-            Array::Spilled => (General::Rdx, memory.len()),
+            Array::Spilled => (General::Rdx, self.own),
             array => (General::Rdx, memory.start(array)),
         };
         let index = match stride {
