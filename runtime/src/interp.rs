@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 use directions::DualRun;
 
 use crate::spatial::Motion;
-use crate::sweep::{Derivatives, FrameState, Inputs, Sweeps};
+use crate::sweep::{Derivatives, FrameState, Inputs, Plain, Sweeps};
 use crate::system::{Accelerated, Conjugate, Constrained, Differentiable, Energetic};
 use crate::system::{LieGroup, LieJoint, MomentumDerivatives, Part, Real, Row, StateDerivatives, System};
 use crate::tree::row_order::RowProducts;
@@ -45,6 +45,8 @@ pub struct Interpreter<S> {
     /// As described: reactions.
     physical: Tree<S>,
     work: Workspace<S>,
+    /// Whether the regrouped tree is plain.
+    plain: bool,
     /// Joint forces, `nv` numbers, N m or N.
     pub tau: Vec<S>,
     /// Prescribed positions, rad, m; unit quaternions.
@@ -109,6 +111,7 @@ impl<S: Scalar> Interpreter<S> {
             gravity,
             names: [Vec::new(), Vec::new()],
             work: Workspace::new(&tree),
+            plain: tree.is_plain(),
             v: vec![o; dims.nv],
             rows: tree.rows(),
             entry_columns: tree.entry_columns(),
@@ -168,6 +171,10 @@ impl<S: Scalar> Interpreter<S> {
 
     /// `(q, p) → (v, q̇, ṗ)`.
     pub fn rates(&mut self, q: &[S], p: &[S], v: &mut [S], qd: &mut [S], pd: &mut [S]) {
+        if self.plain {
+            let sweeps = Sweeps { tree: &self.tree, trace: &Plain };
+            return sweeps.rates(q, p, &inputs!(self), &mut self.work, v, qd, pd);
+        }
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.rates(q, p, &inputs!(self), &mut self.work, v, qd, pd);
     }
@@ -393,8 +400,9 @@ impl<S: Scalar + core::fmt::Debug> System for Interpreter<S> {
     }
 
     fn rates_at(&mut self, _t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
-        let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.rates(q, p, &inputs!(self), &mut self.work, &mut self.v, qd, pd);
+        let mut v = core::mem::take(&mut self.v);
+        self.rates(q, p, &mut v, qd, pd);
+        self.v = v;
     }
 
     fn part_name(&self, part: Part) -> Option<&str> {

@@ -529,6 +529,13 @@ impl<S: Scalar> Tree<S> {
         self.accelerations.as_deref().unwrap_or(self)
     }
 
+    /// Whether the tree has no shared coordinates, no constraints and no external wrenches, and eliminates every freedom at
+    /// its own node, in its own frame. Many trees are so, and the sweeps are compiled apart for them.
+    pub fn is_plain(&self) -> bool {
+        let nothing_else = self.unknowns.is_empty() && self.constraints.is_empty() && self.wrenches.is_empty();
+        nothing_else && self.nodes.iter().all(|node| node.elimination == Elimination::PLAIN)
+    }
+
     /// The same mechanism with fewer non-zero inertial parameters. Inertia of a body that has the same effect as
     /// inertia of its parent is moved to the parent, from the tips to the base (Khalil and Kleinfinger's base
     /// parameters). Through a revolute joint this is all inertia that is symmetric about its axis, `{m, m c_z, (J_yy,

@@ -51,6 +51,7 @@ pub(super) trait Level {
     fn begin<S: Scalar, T: Trace>(_: &mut Context<'_, S, T>) {}
 
     /// Its parts.
+    #[inline(always)]
     fn problem<'b, S: Scalar>(given: &'b Arguments<'_, S>, w: &'b mut Workspace<S>) -> Problem<'b, S>;
 }
 
@@ -64,6 +65,7 @@ pub(super) struct AccelerationLevel;
 pub(super) struct PositionLevel;
 
 impl Level for VelocityLevel {
+    #[inline(always)]
     fn problem<'b, S: Scalar>(given: &'b Arguments<'_, S>, w: &'b mut Workspace<S>) -> Problem<'b, S> {
         let (p, drive, rows) = (given.second, given.inputs.drive_v, w.constraints.rhs.as_slice());
         let load = Load { p, drive, seeds: None, rows, what: Quantity::Velocity };
@@ -79,6 +81,7 @@ impl Level for AccelerationLevel {
         cx.w.drive.fill(S::zero());
     }
 
+    #[inline(always)]
     fn problem<'b, S: Scalar>(_: &'b Arguments<'_, S>, w: &'b mut Workspace<S>) -> Problem<'b, S> {
         let (p, drive, rows) = (w.generalized.as_slice(), w.drive.as_slice(), w.constraints.rhs.as_slice());
         let load = Load { p, drive, seeds: Some(&w.force), rows, what: Quantity::Acceleration };
@@ -93,6 +96,7 @@ impl Level for PositionLevel {
         cx.w.drive.fill(S::zero());
     }
 
+    #[inline(always)]
     fn problem<'b, S: Scalar>(_: &'b Arguments<'_, S>, w: &'b mut Workspace<S>) -> Problem<'b, S> {
         let (p, drive, rows) = (w.generalized.as_slice(), w.drive.as_slice(), w.constraints.rhs.as_slice());
         let load = Load { p, drive, seeds: None, rows, what: Quantity::Constraint };

@@ -176,7 +176,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         qd: &mut [S],
         pd: &mut [S],
     ) {
-        self.context(&Arguments::new(q, p, u), w, Results { v, qd, p: pd, ..Results::none() }).run(SweepList::RATES);
+        self.context(&Arguments::new(q, p, u), w, Results { v, qd, p: pd, ..Results::none() })
+            .run_together(SweepList::RATES);
     }
 
     /// Kinetic and potential energy, J. The potential is zero with every moving mass at the height of the ground's
