@@ -75,6 +75,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let turn = ElementaryTransform::Turn { axis: Axis::Z, c, s };
         let ([px, py], slide) = (placing, shift(Axis::Z, slide));
         match (turns, self.elimination(i).non_rotating) {
+            (false, false) if T::PLAIN && !node.slides => w.joint[i].set([turn]),
             (false, false) => w.joint[i].set([slide, turn]),
             (false, true) => w.joint[i].set([slide]),
             (true, false) => w.joint[i].set_with(2, [px, py, slide, turn]),

@@ -22,7 +22,7 @@ impl<'b, S: Scalar> Steps<'b, S> {
     pub fn motion(self, mut m: Motion<S>) -> Motion<S> {
         for run in self.runs {
             for step in run {
-                m = step.motion(&m);
+                step.carry_motion(&mut m);
             }
         }
         m
@@ -32,7 +32,7 @@ impl<'b, S: Scalar> Steps<'b, S> {
     pub fn vector(self, mut x: Vec3<S>) -> Vec3<S> {
         for run in self.runs {
             for step in run {
-                x = step.vector(x);
+                step.carry_vector(&mut x);
             }
         }
         x
@@ -42,7 +42,7 @@ impl<'b, S: Scalar> Steps<'b, S> {
     pub fn force(self, mut f: Force<S>) -> Force<S> {
         for run in self.runs.into_iter().rev() {
             for step in run.iter().rev() {
-                f = step.force(&f);
+                step.carry_force(&mut f);
             }
         }
         f
