@@ -38,6 +38,7 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Before the first [`Sweeps::factor_node`]: every body by itself.
+    #[inline(always)]
     fn factor_begin(&self, poses: &Poses<S>, f: &mut Factor<S>) {
         for i in 0..self.tree.nodes.len() {
             f.m[i] = self.inertia(poses, i).articulated();

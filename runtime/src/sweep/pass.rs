@@ -198,15 +198,11 @@ impl<S: Scalar, T: Trace> Context<'_, S, T> {
         (list.finish)(self);
     }
 
-    /// [`Context::run`] of an output that takes a plain tree one pass inward and one outward (as [`passes`] says): all
-    /// sweeps of a pass visit a node together, while its numbers are at hand.
+    /// [`Context::run`] after [`Context::articulate`] for an output that takes a plain tree one pass inward and one
+    /// outward (as [`passes`] says): all sweeps of a pass visit a node together, while its numbers are at hand.
     #[inline(always)]
     pub(super) fn run_together<const N: usize>(&mut self, list: SweepList<S, T, N>) {
-        if !T::PLAIN {
-            return self.run(list);
-        }
-        debug_assert!(passes(&list.sweeps, self.sweeps.tree).len() <= 2, "a plain tree is visited twice");
-        self.articulate();
+        debug_assert!(passes(&list.sweeps, self.sweeps.tree).len() <= 2, "a plain tree is visited more often");
         self.pass(&list.sweeps, SweepDirection::TipToBase);
         self.pass(&list.sweeps, SweepDirection::BaseToTip);
         (list.finish)(self);
