@@ -14,9 +14,15 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
         waits: false,
         begin: |cx| {
             cx.sweeps.factor_begin(&cx.w.poses, &mut cx.w.factor);
-            cx.sweeps.seed_columns(&cx.w.constraints.rows, &mut cx.w.factor);
+            if cx.sweeps.has_unknowns() {
+                cx.sweeps.seed_columns(&cx.w.constraints.rows, &mut cx.w.factor);
+            }
         },
-        end: |cx| cx.sweeps.factor_ground(&mut cx.w.factor),
+        end: |cx| {
+            if cx.sweeps.has_unknowns() {
+                cx.sweeps.factor_ground(&mut cx.w.factor);
+            }
+        },
         carried: |cx, i, visit| {
             let (tree, f) = (cx.sweeps.tree, &mut cx.w.factor);
             visit_inertia(&mut f.m[i], visit);

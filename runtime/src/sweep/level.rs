@@ -114,8 +114,10 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
                 cx.sweeps.bias_momentum_begin(&x.load, x.solution);
             },
             end: |cx| {
-                let x = L::problem(cx.given, cx.w);
-                cx.sweeps.bias_momentum_ground(x.factor, &x.load, x.solution);
+                if cx.sweeps.has_unknowns() {
+                    let x = L::problem(cx.given, cx.w);
+                    cx.sweeps.bias_momentum_ground(x.factor, &x.load, x.solution);
+                }
             },
             carried: |cx, i, visit| visit_force(&mut L::problem(cx.given, cx.w).solution.d[i], visit),
             running: |cx, visit| {
@@ -130,8 +132,10 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
     pub(super) const fn motion<L: Level>() -> Self {
         Sweep {
             begin: |cx| {
-                let x = L::problem(cx.given, cx.w);
-                cx.sweeps.motion_ground(x.factor, &x.load, x.solution);
+                if cx.sweeps.has_unknowns() {
+                    let x = L::problem(cx.given, cx.w);
+                    cx.sweeps.motion_ground(x.factor, &x.load, x.solution);
+                }
             },
             carried: |cx, i, visit| visit_motion(&mut L::problem(cx.given, cx.w).solution.omega[i], visit),
             running: |cx, visit| {
