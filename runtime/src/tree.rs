@@ -15,7 +15,7 @@ use crate::spatial::{ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::Scalar;
 
 pub use elimination::Elimination;
-pub(crate) use unrolled::{for_component, for_freedom};
+pub(crate) use unrolled::{each_freedom, for_component};
 
 /// The motion of a node's joint, in the node frame.
 #[derive(Clone, Copy, Debug, PartialEq)]

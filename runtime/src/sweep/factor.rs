@@ -4,7 +4,7 @@
 use super::pass::{each_node, visit_force, visit_inertia, Sweep};
 use super::{name, Quantity, Sweeps, Trace};
 use crate::spatial::{ArticulatedInertia, Force};
-use crate::tree::{for_component, for_freedom, Freedom, Source, Unknown};
+use crate::tree::{each_freedom, for_component, Freedom, Source, Unknown};
 use crate::workspace::{Factor, Pivot, Poses};
 use crate::Scalar;
 
@@ -118,9 +118,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for (k, &g) in self.elimination(i).solve_before.iter().enumerate() {
             self.solve_unknown(g, Some(i), self.elimination(i).open_before(k + 1), f);
         }
-        for k in 0..node.kind.nv() {
-            self.eliminate(i, k, first[i] + k, f);
-        }
+        each_freedom!(node.kind, |k, e| self.eliminate(i, e, node.passive[k].armature, first[i] + k, f));
         for (k, &g) in self.elimination(i).solve_after.iter().enumerate() {
             self.solve_unknown(g, Some(i), self.elimination(i).open_after(k + 1), f);
         }
@@ -153,16 +151,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Own freedom `k` of node `i`: eliminated, prescribed, or added to the open column of its unknown.
+    /// Own freedom of node `i` along `e`: eliminated, prescribed, or added to the open column of its unknown.
     #[inline(always)]
-    fn eliminate(&self, i: usize, k: usize, freedom: usize, f: &mut Factor<S>) {
-        let node = &self.tree.nodes[i];
-        for_freedom!(node.kind, k, |e| self.eliminate_along(i, e, node.passive[k].armature, freedom, f));
-    }
-
-    /// [`Sweeps::eliminate`] for a freedom along `e`.
-    #[inline(always)]
-    fn eliminate_along(&self, i: usize, e: Freedom<S>, armature: S, freedom: usize, f: &mut Factor<S>) {
+    fn eliminate(&self, i: usize, e: Freedom<S>, armature: S, freedom: usize, f: &mut Factor<S>) {
         let node = &self.tree.nodes[i];
         let u = column(&e, &f.m[i]); // U = M* E
         name::force(self.trace, "u", &u);

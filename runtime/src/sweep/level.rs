@@ -51,7 +51,6 @@ pub(super) trait Level {
     fn begin<S: Scalar, T: Trace>(_: &mut Context<'_, S, T>) {}
 
     /// Its parts.
-    #[inline(always)]
     fn problem<'b, S: Scalar>(given: &'b Arguments<'_, S>, w: &'b mut Workspace<S>) -> Problem<'b, S>;
 }
 

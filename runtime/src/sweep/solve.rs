@@ -6,7 +6,7 @@
 use super::level::Load;
 use super::{name, Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Motion};
-use crate::tree::{for_component, for_freedom, Freedom, Source, Unknown};
+use crate::tree::{each_freedom, for_component, Freedom, Source, Unknown};
 use crate::workspace::{Factor, Poses, Solution};
 use crate::Scalar;
 
@@ -44,9 +44,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             let e = self.unknown_bias_momentum(g, f, load, sol, self.elimination(i).open_before(k + 1));
             d = d.plus(&f.unknown_pivots[g].u.times(e));
         }
-        for k in 0..node.kind.nv() {
-            self.bias_momentum(i, k, first[i] + k, f, load, sol, &mut d);
-        }
+        each_freedom!(node.kind, |k, axis| self.bias_momentum(i, k, axis, first[i] + k, f, load, sol, &mut d));
         for (k, &g) in self.elimination(i).solve_after.iter().enumerate() {
             let e = self.unknown_bias_momentum(g, f, load, sol, self.elimination(i).open_after(k + 1));
             d = d.plus(&f.unknown_pivots[g].u.times(e));
@@ -67,24 +65,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Own freedom `k` of node `i` in the sweep from tip to base.
+    /// Own freedom `k` of node `i`, along `axis`, in the sweep from tip to base.
     #[inline(always)]
     fn bias_momentum(
-        &self,
-        i: usize,
-        k: usize,
-        freedom: usize,
-        f: &Factor<S>,
-        load: &Load<S>,
-        sol: &mut Solution<S>,
-        d: &mut Force<S>,
-    ) {
-        for_freedom!(self.tree.nodes[i].kind, k, |axis| self.bias_momentum_along(i, k, axis, freedom, f, load, sol, d));
-    }
-
-    /// [`Sweeps::bias_momentum`] for a freedom along `axis`.
-    #[inline(always)]
-    fn bias_momentum_along(
         &self,
         i: usize,
         k: usize,
@@ -179,11 +162,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             self.unknown_motion(g, f, &hat, self.elimination(i).open_after(k + 1), sol);
         }
         let mut omega = hat;
-        for k in (0..node.kind.nv()).rev() {
-            let rate = for_freedom!(node.kind, k, |axis| self.rate_along(i, axis, first[i] + k, f, sol, &mut omega));
+        each_freedom!(node.kind, rev, |k, axis| {
+            let rate = self.rate_along(i, axis, first[i] + k, f, sol, &mut omega);
             sol.rate[first[i] + k] = rate;
             self.trace.name(rate, rate_letter, "");
-        }
+        });
         for (k, &g) in self.elimination(i).solve_before.iter().enumerate().rev() {
             self.unknown_motion(g, f, &omega, self.elimination(i).open_before(k + 1), sol);
         }
