@@ -152,7 +152,7 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
 
     /// How the freedoms of node `i` are eliminated: a constant where the tree is known to be plain.
     #[inline(always)]
-    fn elimination<'b>(&'b self, i: usize) -> &'b Elimination {
+    fn elimination(&self, i: usize) -> &Elimination {
         match T::PLAIN {
             true => PLAIN,
             false => &self.tree.nodes[i].elimination,
