@@ -17,11 +17,14 @@ use multibody::runtime::Interpreter;
 use crate::args::interpreter::InterpreterArgs;
 
 /// Mechanisms: name, file, text, what a URDF's root is connected to.
-const MECHANISMS: [(&str, &str, &str, Base); 4] = [
+const MECHANISMS: [(&str, &str, &str, Base); 7] = [
     ("double_pendulum", "double_pendulum.toml", include_str!("../../models/double_pendulum.toml"), Base::Fixed),
     ("ur5", "ur5.urdf", include_str!("../../models/ur5.urdf"), Base::Fixed),
+    ("panda", "panda_arm.urdf", include_str!("../../models/panda_arm.urdf"), Base::Fixed),
+    ("solo12", "solo12.urdf", include_str!("../../models/solo12.urdf"), Base::Floating),
     ("g1", "g1.urdf", include_str!("../../models/g1.urdf"), Base::Floating),
     ("chain100", "chain100.toml", include_str!("../../models/chain100.toml"), Base::Fixed),
+    ("stewart", "stewart.toml", include_str!("../../models/mechanisms/stewart.toml"), Base::Fixed),
 ];
 
 /// Least time of one measurement, s, and the number of them, of which the fastest counts.

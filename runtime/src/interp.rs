@@ -1,6 +1,8 @@
 //! The interpreter: it runs the sweeps directly on numbers, for any tree.
 
 mod directions;
+mod rank;
+mod system;
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -8,12 +10,10 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use directions::DualRun;
+pub use rank::MassMatrixError;
 
-use crate::spatial::Motion;
-use crate::sweep::{Derivatives, FrameState, Inputs, Sweeps};
-use crate::system::{Accelerated, Conjugate, Constrained, Differentiable, Energetic};
-use crate::system::{LieGroup, LieJoint, MomentumDerivatives, Part, Real, Row, StateDerivatives, System};
-use crate::tree::row_order::RowProducts;
+use crate::sweep::{Derivatives, FrameState, Inputs, Plain, Sweeps};
+use crate::system::{LieGroup, LieJoint, MomentumDerivatives, Row};
 use crate::tree::{Kind, Source, Tree};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -45,6 +45,8 @@ pub struct Interpreter<S> {
     /// As described: reactions.
     physical: Tree<S>,
     work: Workspace<S>,
+    /// Whether the regrouped tree is plain.
+    plain: bool,
     /// Joint forces, `nv` numbers, N m or N.
     pub tau: Vec<S>,
     /// Prescribed positions, rad, m; unit quaternions.
@@ -109,6 +111,7 @@ impl<S: Scalar> Interpreter<S> {
             gravity,
             names: [Vec::new(), Vec::new()],
             work: Workspace::new(&tree),
+            plain: tree.is_plain(),
             v: vec![o; dims.nv],
             rows: tree.rows(),
             entry_columns: tree.entry_columns(),
@@ -168,6 +171,10 @@ impl<S: Scalar> Interpreter<S> {
 
     /// `(q, p) → (v, q̇, ṗ)`.
     pub fn rates(&mut self, q: &[S], p: &[S], v: &mut [S], qd: &mut [S], pd: &mut [S]) {
+        if self.plain {
+            let sweeps = Sweeps { tree: &self.tree, trace: &Plain };
+            return sweeps.rates(q, p, &inputs!(self), &mut self.work, v, qd, pd);
+        }
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.rates(q, p, &inputs!(self), &mut self.work, v, qd, pd);
     }
@@ -295,218 +302,5 @@ impl<S: Scalar> Interpreter<S> {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         let frames = self.tree.frames.iter().zip(out);
         sweeps.frame_states(q, v, &inputs!(self), &mut self.work, frames);
-    }
-}
-
-/// What can be wrong with a mass matrix.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum MassMatrixError {
-    /// The matrix has no full rank: a freedom moves no inertia.
-    Singular {
-        /// Velocity index of the freedom.
-        velocity: usize,
-        /// Name of the freedom, where the interpreter knows it ([`Interpreter::with_names`]).
-        name: Option<String>,
-        /// Inertia it moves, all other freedoms outboard of it being free: zero, negative or not a number.
-        inertia: f64,
-    },
-}
-
-impl core::fmt::Display for MassMatrixError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let MassMatrixError::Singular { velocity, name, inertia } = self;
-        write!(f, "the mass matrix is singular: ")?;
-        match name {
-            Some(name) => write!(f, "freedom `{name}`")?,
-            None => write!(f, "velocity {velocity}")?,
-        }
-        write!(f, " moves an inertia of {inertia:e}")
-    }
-}
-
-impl core::error::Error for MassMatrixError {}
-
-impl<S: Real> Interpreter<S> {
-    /// Whether every freedom moves a positive inertia at the coordinates `q`. The sweeps themselves do not look: where
-    /// this fails, velocities and accelerations are infinite or not numbers.
-    ///
-    /// # Errors
-    /// [`MassMatrixError::Singular`] for the first freedom, outboard first, without inertia.
-    pub fn check_rank(&mut self, q: &[S]) -> Result<(), MassMatrixError> {
-        let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.factor(q, &inputs!(self), &mut self.work);
-        let own = self.tree.nodes.iter().enumerate().rev().filter_map(|(i, node)| {
-            match (node.source, node.elimination.unknown) {
-                (Source::State { v, .. }, None) => Some((v, self.work.first[i]..self.work.first[i + 1])),
-                _ => None,
-            }
-        });
-        let own = own.flat_map(|(v, freedoms)| freedoms.enumerate().map(move |(k, f)| (v + k, f)));
-        let own = own.map(|(v, f)| (v, self.work.factor.pivots[f].rho));
-        let shared = self
-            .tree
-            .unknowns
-            .iter()
-            .zip(&self.work.factor.unknown_pivots)
-            .filter_map(|(s, pivot)| Some((s.velocity()?, pivot.rho)));
-        // A zero pivot spoils those inboard of it: it is the one to name.
-        let mut found = None;
-        for (velocity, rho) in own.chain(shared) {
-            let inertia = 1.0 / rho.to_f64();
-            if inertia.is_nan() {
-                found = found.or(Some((velocity, inertia)));
-            } else if !(rho.is_finite() && rho > S::zero()) {
-                found = Some((velocity, inertia));
-                break;
-            }
-        }
-        let Some((velocity, inertia)) = found else { return Ok(()) };
-        let name = self.names[0].get(velocity).cloned();
-        Err(MassMatrixError::Singular { velocity, name, inertia })
-    }
-}
-
-impl<S: Scalar> FrameState<S> {
-    /// The ground itself.
-    pub fn ground() -> Self {
-        let (o, one) = (S::zero(), S::one());
-        FrameState { rotation: [[one, o, o], [o, one, o], [o, o, one]], position: [o; 3], velocity: Motion::zero() }
-    }
-}
-
-impl<S: Scalar + core::fmt::Debug> System for Interpreter<S> {
-    type Scalar = S;
-    type Coordinates = Vec<S>;
-    type Momenta = Vec<S>;
-
-    fn neutral(&self) -> Vec<S> {
-        self.neutral.clone()
-    }
-
-    fn zero_momenta(&self) -> Vec<S> {
-        vec![S::zero(); self.tree.dims.nv]
-    }
-
-    fn lie_joints(&self) -> &[LieJoint] {
-        &self.groups
-    }
-
-    fn rates_at(&mut self, _t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
-        let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.rates(q, p, &inputs!(self), &mut self.work, &mut self.v, qd, pd);
-    }
-
-    fn part_name(&self, part: Part) -> Option<&str> {
-        let [velocities, constraints] = &self.names;
-        let name = match part {
-            Part::Velocity(k) => velocities.get(k),
-            Part::Constraint(k) => constraints.get(k),
-        };
-        name.map(String::as_str)
-    }
-
-    fn coordinate_rates(&self, q: &Vec<S>, v: &Vec<S>, qd: &mut Vec<S>) {
-        Sweeps { tree: &self.tree, trace: &() }.coordinate_rates(q, v, qd);
-    }
-}
-
-impl<S: Scalar + core::fmt::Debug> Energetic for Interpreter<S> {
-    fn energies(&mut self, q: &Vec<S>, p: &Vec<S>) -> (S, S) {
-        self.energy(q, p)
-    }
-}
-
-impl<S: Scalar + core::fmt::Debug> Conjugate for Interpreter<S> {
-    fn conjugate_momenta(&mut self, q: &Vec<S>, v: &Vec<S>, p: &mut Vec<S>) {
-        self.momenta(q, v, p);
-    }
-}
-
-impl<S: Scalar + core::fmt::Debug> Accelerated for Interpreter<S> {
-    fn generalized_accelerations(&mut self, q: &Vec<S>, v: &Vec<S>, a: &mut Vec<S>) {
-        self.accelerations(q, v, a);
-    }
-}
-
-impl<S: Real> Constrained for Interpreter<S> {
-    type Rows = Vec<S>;
-    type Entries = Vec<S>;
-
-    fn zero_rows(&self) -> Vec<S> {
-        vec![S::zero(); self.rows.len()]
-    }
-
-    fn zero_entries(&self) -> Vec<S> {
-        vec![S::zero(); self.entry_columns.len()]
-    }
-
-    fn rows(&self) -> &[Row] {
-        &self.rows
-    }
-
-    fn entry_columns(&self) -> &[usize] {
-        &self.entry_columns
-    }
-
-    fn constraint_residuals(&mut self, q: &Vec<S>, residual: &mut Vec<S>, jacobian: &mut Vec<S>) {
-        self.residuals(q, residual, jacobian);
-    }
-
-    fn project_momenta(&mut self, _t: S, q: &Vec<S>, p: &mut Vec<S>, v: &mut Vec<S>, sigma: &mut Vec<S>) {
-        let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        self.v.copy_from_slice(p);
-        sweeps.project_momenta(q, &self.v, &inputs!(self), &mut self.work, v, p, sigma);
-    }
-
-    fn position_correction(&mut self, q: &Vec<S>, residual: &mut Vec<S>, dq: &mut Vec<S>, pivots: &mut Vec<S>) {
-        let sweeps = Sweeps { tree: &self.tree, trace: &() };
-        sweeps.position_correction(q, &inputs!(self), &mut self.work, residual, dq, pivots);
-    }
-
-    fn multipliers(&mut self, _t: S, q: &Vec<S>, v: &Vec<S>, lambda: &mut Vec<S>) {
-        self.constraint_multipliers(q, v, lambda);
-    }
-
-    fn reorder_rows(&mut self, q: &Vec<S>) -> bool {
-        if !self.tree.rows_can_be_ordered() {
-            return false;
-        }
-        let at = RowProducts::new(self, q);
-        let changed = self.tree.reorder_rows(&at);
-        if self.physical.reorder_rows(&at) || changed {
-            self.work = Workspace::new(&self.tree);
-            (self.derivatives, self.dual) = (None, None);
-        }
-        changed
-    }
-}
-
-impl<S: Scalar + core::fmt::Debug> Differentiable for Interpreter<S> {
-    type Square = Vec<Vec<S>>;
-
-    fn square(&self) -> Vec<Vec<S>> {
-        let nv = self.tree.dims.nv;
-        vec![vec![S::zero(); nv]; nv]
-    }
-
-    fn rate_derivatives(&mut self, _t: S, q: &Vec<S>, p: &Vec<S>, out: &mut StateDerivatives<Vec<S>, Vec<Vec<S>>>) {
-        if !self.tree.constraints.is_empty() {
-            let mut run = self.dual.take().unwrap_or_else(|| Box::new(DualRun::new(&self.tree)));
-            run.derivatives(&inputs!(self), q, p, out);
-            self.dual = Some(run);
-            return;
-        }
-        let mut d = self.derivatives.take().unwrap_or_else(|| Box::new(Derivatives::new(&self.tree)));
-        self.derivatives(q, p, &mut d);
-        out.v.copy_from_slice(&d.v);
-        out.pd.copy_from_slice(&d.pd);
-        let blocks = [&d.dv_dq, &d.dv_dp, &d.dpd_dq, &d.dpd_dp];
-        for (to, from) in out.blocks_mut().into_iter().flatten().zip(blocks) {
-            for (row, from) in to.iter_mut().zip(from.chunks(p.len().max(1))) {
-                row.copy_from_slice(from);
-            }
-        }
-        self.derivatives = Some(d);
     }
 }

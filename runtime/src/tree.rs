@@ -15,7 +15,7 @@ use crate::spatial::{ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::Scalar;
 
 pub use elimination::Elimination;
-pub(crate) use unrolled::{for_component, for_freedom};
+pub(crate) use unrolled::{each_freedom, for_component};
 
 /// The motion of a node's joint, in the node frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -176,6 +176,8 @@ pub struct Node<S> {
     pub quarter: u8,
     /// Constant displacement along the joint axis, m.
     pub slide: S,
+    /// Whether there is such a displacement. Where it is zero by structure, a plain tree is run without it.
+    pub slides: bool,
     /// Inertia of the bodies that move with the node, in its frame.
     pub inertia: RigidInertia<S>,
     /// Passive elements, one entry for each degree of freedom.
@@ -527,6 +529,13 @@ impl<S: Scalar> Tree<S> {
     /// The tree for [`crate::sweep::Sweeps::accelerations`].
     pub fn for_accelerations(&self) -> &Tree<S> {
         self.accelerations.as_deref().unwrap_or(self)
+    }
+
+    /// Whether the tree has no shared coordinates, no constraints and no external wrenches, and eliminates every freedom at
+    /// its own node, in its own frame. Many trees are so, and the sweeps are compiled apart for them.
+    pub fn is_plain(&self) -> bool {
+        let nothing_else = self.unknowns.is_empty() && self.constraints.is_empty() && self.wrenches.is_empty();
+        nothing_else && self.nodes.iter().all(|node| node.elimination == Elimination::PLAIN)
     }
 
     /// The same mechanism with fewer non-zero inertial parameters. Inertia of a body that has the same effect as

@@ -160,6 +160,7 @@ impl Plan {
             phase: S::constant(node.phase),
             quarter: node.quarter,
             slide: S::constant(node.slide),
+            slides: node.slide != 0.0,
             inertia: self.inertia(node, params),
             elimination: node.elimination.clone(),
         }

@@ -304,6 +304,7 @@ fn dummy<'g>(accumulates_momentum: bool) -> Node<Expr<'g>> {
         phase: Expr::zero(),
         quarter: 0,
         slide: Expr::zero(),
+        slides: false,
         inertia: RigidInertia::zero(),
         passive: Vec::new(),
         elimination: Elimination { accumulates_momentum, ..Elimination::default() },

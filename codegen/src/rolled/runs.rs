@@ -321,6 +321,7 @@ pub(super) fn map_node<A: Copy, B>(node: &Node<A>, f: &mut impl FnMut(A) -> B) -
         phase: f(node.phase),
         quarter: node.quarter,
         slide: f(node.slide),
+        slides: node.slides,
         inertia: mbd_runtime::spatial::RigidInertia {
             mass: f(node.inertia.mass),
             moment: node.inertia.moment.map(&mut *f),

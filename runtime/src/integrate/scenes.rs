@@ -43,6 +43,7 @@ pub fn joint<S: Scalar>(tree: &mut Tree<S>, back: usize, kind: Kind<S>, stiffnes
         phase: o,
         quarter: 0,
         slide: o,
+        slides: false,
         inertia: body(size, [0.2, 0.05, -0.1], [0.03, 0.05, 0.06]),
         passive: vec![passive; kind.nv()],
         kind,

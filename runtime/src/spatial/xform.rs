@@ -142,57 +142,81 @@ fn turn_general<S: Scalar>(c: S, s: S, h: &mut Mat3<S>, a: usize, b: usize, n: u
 impl<S: Scalar> ElementaryTransform<S> {
     /// Components of a free vector of the parent in the child's axes.
     #[inline(always)]
-    pub fn vector(&self, x: Vec3<S>) -> Vec3<S> {
+    pub fn vector(&self, mut x: Vec3<S>) -> Vec3<S> {
+        self.carry_vector(&mut x);
+        x
+    }
+
+    /// [`ElementaryTransform::vector`] in place: numbers that stay what they are are not copied.
+    #[inline(always)]
+    pub fn carry_vector(&self, x: &mut Vec3<S>) {
         match self {
-            ElementaryTransform::Turn { axis, c, s } => for_axis!(axis, |a, b, _| {
-                let mut x = x;
-                (x[a], x[b]) = pair_back(*c, *s, x[a], x[b]);
-                x
-            }),
-            ElementaryTransform::Shift { .. } => x,
-            ElementaryTransform::Rotate(r) => down3(r, x),
+            ElementaryTransform::Turn { axis, c, s } => {
+                for_axis!(axis, |a, b, _| (x[a], x[b]) = pair_back(*c, *s, x[a], x[b]));
+            }
+            ElementaryTransform::Shift { .. } => {}
+            ElementaryTransform::Rotate(r) => *x = down3(r, *x),
         }
     }
 
     /// Components of a free vector of the child in the parent's axes.
     #[inline(always)]
-    pub fn vector_back(&self, x: Vec3<S>) -> Vec3<S> {
+    pub fn vector_back(&self, mut x: Vec3<S>) -> Vec3<S> {
         match self {
-            ElementaryTransform::Turn { axis, c, s } => for_axis!(axis, |a, b, _| {
-                let mut x = x;
-                (x[a], x[b]) = pair(*c, *s, x[a], x[b]);
-                x
-            }),
-            ElementaryTransform::Shift { .. } => x,
-            ElementaryTransform::Rotate(r) => up3(r, x),
+            ElementaryTransform::Turn { axis, c, s } => {
+                for_axis!(axis, |a, b, _| (x[a], x[b]) = pair(*c, *s, x[a], x[b]));
+            }
+            ElementaryTransform::Shift { .. } => {}
+            ElementaryTransform::Rotate(r) => x = up3(r, x),
         }
+        x
     }
 
     /// Velocity `X Ω` at the child's origin, in the child's axes, of a motion `Ω` given at the parent frame.
     #[inline(always)]
     pub fn motion(&self, m: &Motion<S>) -> Motion<S> {
+        let mut m = *m;
+        self.carry_motion(&mut m);
+        m
+    }
+
+    /// [`ElementaryTransform::motion`] in place.
+    #[inline(always)]
+    pub fn carry_motion(&self, m: &mut Motion<S>) {
         match self {
+            ElementaryTransform::Turn { axis, c, s } => for_axis!(axis, |a, b, _| {
+                (m.lin[a], m.lin[b]) = pair_back(*c, *s, m.lin[a], m.lin[b]);
+                (m.ang[a], m.ang[b]) = pair_back(*c, *s, m.ang[a], m.ang[b]);
+            }),
             ElementaryTransform::Shift { axis, r } => for_axis!(axis, |a, b, _| {
-                let mut m = *m;
                 m.lin[a] = m.lin[a] + *r * m.ang[b];
                 m.lin[b] = m.lin[b] - *r * m.ang[a];
-                m
             }),
-            _ => Motion { lin: self.vector(m.lin), ang: self.vector(m.ang) },
+            ElementaryTransform::Rotate(r) => *m = Motion { lin: down3(r, m.lin), ang: down3(r, m.ang) },
         }
     }
 
     /// Momentum or wrench `Xᵀ P` at the parent frame, of `P` given at the child frame.
     #[inline(always)]
     pub fn force(&self, f: &Force<S>) -> Force<S> {
+        let mut f = *f;
+        self.carry_force(&mut f);
+        f
+    }
+
+    /// [`ElementaryTransform::force`] in place.
+    #[inline(always)]
+    pub fn carry_force(&self, f: &mut Force<S>) {
         match self {
+            ElementaryTransform::Turn { axis, c, s } => for_axis!(axis, |a, b, _| {
+                (f.lin[a], f.lin[b]) = pair(*c, *s, f.lin[a], f.lin[b]);
+                (f.ang[a], f.ang[b]) = pair(*c, *s, f.ang[a], f.ang[b]);
+            }),
             ElementaryTransform::Shift { axis, r } => for_axis!(axis, |a, b, _| {
-                let mut f = *f;
                 f.ang[a] = f.ang[a] - *r * f.lin[b];
                 f.ang[b] = f.ang[b] + *r * f.lin[a];
-                f
             }),
-            _ => Force { lin: self.vector_back(f.lin), ang: self.vector_back(f.ang) },
+            ElementaryTransform::Rotate(r) => *f = Force { lin: up3(r, f.lin), ang: up3(r, f.ang) },
         }
     }
 

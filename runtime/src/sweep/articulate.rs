@@ -74,13 +74,14 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let (s, c) = quarter_turn(angle.sin_cos(), quarter);
         let turn = ElementaryTransform::Turn { axis: Axis::Z, c, s };
         let ([px, py], slide) = (placing, shift(Axis::Z, slide));
-        match (turns, node.elimination.non_rotating) {
+        match (turns, self.elimination(i).non_rotating) {
+            (false, false) if T::PLAIN && !node.slides => w.joint[i].set([turn]),
             (false, false) => w.joint[i].set([slide, turn]),
             (false, true) => w.joint[i].set([slide]),
             (true, false) => w.joint[i].set_with(2, [px, py, slide, turn]),
             (true, true) => w.joint[i].set_with(2, [px, py, slide]),
         }
-        if node.elimination.non_rotating {
+        if self.elimination(i).non_rotating {
             let inertia = RigidInertia::from_articulated(&turn.inertia(&node.inertia.articulated()));
             w.body[i] = TurnedBody { angle, quarter, c, s, inertia };
         }

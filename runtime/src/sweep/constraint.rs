@@ -91,7 +91,7 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
     /// Poses of the frames of cuts along the paths to them, where rows or `b` depend on these (`ALL`: of all cuts).
     pub(super) const fn paths<const ALL: bool>() -> Self {
         Sweep {
-            needed: |tree| tree.constraints.iter().any(|c| c.is_cut() && (ALL || !c.at_hand())),
+            needed: |tree| !T::PLAIN && tree.constraints.iter().any(|c| c.is_cut() && (ALL || !c.at_hand())),
             begin: |cx| cx.sweeps.reach_begin(cx.w),
             running: |cx, visit| {
                 let ends = cx.w.constraints.reach.iter_mut().flatten();
@@ -104,7 +104,7 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
     /// Rows of the constraints, after [`Sweep::paths`]. Visits no node.
     pub(super) const fn rows<const ALL: bool>() -> Self {
         Sweep {
-            needed: |tree| !tree.constraints.is_empty(),
+            needed: |tree| !T::PLAIN && !tree.constraints.is_empty(),
             // Rows that are constants of the body at the end of a chain: nothing pulls at its joints as they turn.
             rolls: |tree| tree.constraints.iter().all(Constraint::gauge),
             begin: |cx| cx.sweeps.set_rows(cx.w, ALL),
@@ -114,7 +114,7 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
 
     /// Multipliers out of the velocities, and the joint forces of constraints whose rows turn. Visits no node.
     pub(super) const CONSTRAINT_FORCES: Self = Sweep {
-        needed: |tree| !tree.constraints.is_empty(),
+        needed: |tree| !T::PLAIN && !tree.constraints.is_empty(),
         end: |cx| cx.sweeps.constraint_forces(cx.w),
         ..Sweep::idle(SweepDirection::BaseToTip)
     };

@@ -13,7 +13,7 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
     /// Right-hand sides of the rows relative to a reference motion, after [`Sweep::NEWTON`], from the velocities of all
     /// nodes.
     pub(super) const ROW_ACCELERATIONS: Self = Sweep {
-        needed: |tree| !tree.constraints.is_empty(),
+        needed: |tree| !T::PLAIN && !tree.constraints.is_empty(),
         rolls: |_| false,
         end: |cx| cx.sweeps.row_accelerations(&cx.given.inputs, cx.w),
         ..Self::VELOCITY

@@ -4,7 +4,7 @@
 use super::pass::{each_node, visit_force, visit_inertia, Sweep};
 use super::{name, Quantity, Sweeps, Trace};
 use crate::spatial::{ArticulatedInertia, Force};
-use crate::tree::{for_component, for_freedom, Freedom, Source, Unknown};
+use crate::tree::{each_freedom, for_component, Freedom, Source, Unknown};
 use crate::workspace::{Factor, Pivot, Poses};
 use crate::Scalar;
 
@@ -14,9 +14,15 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
         waits: false,
         begin: |cx| {
             cx.sweeps.factor_begin(&cx.w.poses, &mut cx.w.factor);
-            cx.sweeps.seed_columns(&cx.w.constraints.rows, &mut cx.w.factor);
+            if cx.sweeps.has_unknowns() {
+                cx.sweeps.seed_columns(&cx.w.constraints.rows, &mut cx.w.factor);
+            }
         },
-        end: |cx| cx.sweeps.factor_ground(&mut cx.w.factor),
+        end: |cx| {
+            if cx.sweeps.has_unknowns() {
+                cx.sweeps.factor_ground(&mut cx.w.factor);
+            }
+        },
         carried: |cx, i, visit| {
             let (tree, f) = (cx.sweeps.tree, &mut cx.w.factor);
             visit_inertia(&mut f.m[i], visit);
@@ -38,6 +44,7 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Before the first [`Sweeps::factor_node`]: every body by itself.
+    #[inline(always)]
     fn factor_begin(&self, poses: &Poses<S>, f: &mut Factor<S>) {
         for i in 0..self.tree.nodes.len() {
             f.m[i] = self.inertia(poses, i).articulated();
@@ -56,8 +63,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     fn clear_open(&self, f: &mut Factor<S>) {
         let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
         f.whole.fill(S::zero());
-        for (i, node) in self.tree.nodes.iter().enumerate() {
-            for g in node.elimination.open_before(0).chain(node.elimination.unknown) {
+        for i in 0..n {
+            for g in self.elimination(i).open_before(0).chain(self.elimination(i).unknown) {
                 f.columns[g * n + i] = Force::zero();
             }
         }
@@ -82,9 +89,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let (n, node) = (self.tree.nodes.len(), &self.tree.nodes[i]);
         let Some(p) = node.parent else { return };
         let inner = &self.tree.nodes[p];
-        for &g in &node.elimination.screws {
+        for &g in &self.elimination(i).screws {
             self.trace.at(Some(i), Quantity::Inertia);
-            let at_parent = match inner.elimination.unknown == Some(g) {
+            let at_parent = match self.elimination(p).unknown == Some(g) {
                 true => inner.kind.axis(0).motion(S::one()),
                 false => self.leaving(poses, p).motion(f.screws[g * n + p]),
             };
@@ -101,26 +108,24 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Inertia);
         name::inertia(self.trace, "m", &f.m[i]); // M*_i (4.48)
-        if node.elimination.before_joint {
+        if self.elimination(i).before_joint {
             self.leaving(poses, i).carry_inertia(&mut f.m[i]);
-            for g in node.elimination.open_before(0) {
+            for g in self.elimination(i).open_before(0) {
                 f.columns[g * n + i] = self.leaving(poses, i).force(f.columns[g * n + i]);
             }
         }
         self.trace.at(Some(i), Quantity::Pivot);
-        for (k, &g) in node.elimination.solve_before.iter().enumerate() {
-            self.solve_unknown(g, Some(i), node.elimination.open_before(k + 1), f);
+        for (k, &g) in self.elimination(i).solve_before.iter().enumerate() {
+            self.solve_unknown(g, Some(i), self.elimination(i).open_before(k + 1), f);
         }
-        for k in 0..node.kind.nv() {
-            self.eliminate(i, k, first[i] + k, f);
-        }
-        for (k, &g) in node.elimination.solve_after.iter().enumerate() {
-            self.solve_unknown(g, Some(i), node.elimination.open_after(k + 1), f);
+        each_freedom!(node.kind, |k, e| self.eliminate(i, e, node.passive[k].armature, first[i] + k, f));
+        for (k, &g) in self.elimination(i).solve_after.iter().enumerate() {
+            self.solve_unknown(g, Some(i), self.elimination(i).open_after(k + 1), f);
         }
         name::inertia(self.trace, "mp", &f.m[i]); // M'_i (4.44)
         let ng = self.tree.unknowns.len();
-        for &h in &node.elimination.ends {
-            for &g in &node.elimination.screws {
+        for &h in &self.elimination(i).ends {
+            for &g in &self.elimination(i).screws {
                 let x = f.gram[g * ng + h] + f.columns[h * n + i].dot(&f.screws[g * n + i]);
                 f.gram[g * ng + h] = x;
                 f.gram[h * ng + g] = x;
@@ -131,7 +136,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let mut carried = f.m[i];
         self.entering(poses, i).carry_inertia(&mut carried);
         f.m[parent] = f.m[parent].plus(&carried);
-        for &g in &node.elimination.open {
+        for &g in &self.elimination(i).open {
             let column = self.entering(poses, i).force(f.columns[g * n + i]);
             f.columns[g * n + parent] = f.columns[g * n + parent].plus(&column);
         }
@@ -146,21 +151,15 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Own freedom `k` of node `i`: eliminated, prescribed, or added to the open column of its unknown.
-    fn eliminate(&self, i: usize, k: usize, freedom: usize, f: &mut Factor<S>) {
-        let node = &self.tree.nodes[i];
-        for_freedom!(node.kind, k, |e| self.eliminate_along(i, e, node.passive[k].armature, freedom, f));
-    }
-
-    /// [`Sweeps::eliminate`] for a freedom along `e`.
+    /// Own freedom of node `i` along `e`: eliminated, prescribed, or added to the open column of its unknown.
     #[inline(always)]
-    fn eliminate_along(&self, i: usize, e: Freedom<S>, armature: S, freedom: usize, f: &mut Factor<S>) {
+    fn eliminate(&self, i: usize, e: Freedom<S>, armature: S, freedom: usize, f: &mut Factor<S>) {
         let node = &self.tree.nodes[i];
         let u = column(&e, &f.m[i]); // U = M* E
         name::force(self.trace, "u", &u);
         if self.has_unknowns() {
             self.cross_open(i, &e, freedom, f);
-            if let Some(g) = node.elimination.unknown {
+            if let Some(g) = self.elimination(i).unknown {
                 return self.add_to_open(i, g, &e, freedom, &u.times(node.ratio), f);
             }
         }
@@ -180,7 +179,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Inertia between a freedom of node `i` and the open unknowns.
     fn cross_open(&self, i: usize, e: &Freedom<S>, freedom: usize, f: &mut Factor<S>) {
         let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
-        for h in self.tree.nodes[i].elimination.open_after(0) {
+        for h in self.elimination(i).open_after(0) {
             f.cross[freedom * ng + h] = e.dot(&f.columns[h * n + i]) + self.coupled(i, h);
         }
     }
@@ -193,7 +192,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let column = f.columns[g * n + i].plus(column);
         let rotor = a * a * node.passive[0].armature;
         f.gram[g * ng + g] = f.gram[g * ng + g] + a * (old + e.dot(&column)) + rotor;
-        for h in node.elimination.open_after(0).filter(|&h| h != g) {
+        for h in self.elimination(i).open_after(0).filter(|&h| h != g) {
             let x = f.gram[g * ng + h] + a * f.cross[freedom * ng + h];
             f.gram[g * ng + h] = x;
             f.gram[h * ng + g] = x;
@@ -204,14 +203,14 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Takes an eliminated freedom of node `i` out of the columns of open unknowns.
     fn reduce_open(&self, i: usize, freedom: usize, f: &mut Factor<S>) {
         let pivot = f.pivots[freedom];
-        let (n, ng, node) = (self.tree.nodes.len(), self.tree.unknowns.len(), &self.tree.nodes[i]);
-        for h in node.elimination.open_after(0) {
+        let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
+        for h in self.elimination(i).open_after(0) {
             let c = f.cross[freedom * ng + h];
             f.columns[h * n + i] = f.columns[h * n + i].minus(&pivot.k.times(c));
             if let Unknown::Row(_) = self.tree.unknowns[h] {
                 f.whole[h] = f.whole[h] + c * (pivot.rho * c);
             }
-            for h2 in node.elimination.open_after(0) {
+            for h2 in self.elimination(i).open_after(0) {
                 f.gram[h * ng + h2] = f.gram[h * ng + h2] - c * (pivot.rho * f.cross[freedom * ng + h2]);
             }
         }

@@ -18,6 +18,14 @@ pub struct FrameState<S> {
     pub velocity: Motion<S>,
 }
 
+impl<S: Scalar> FrameState<S> {
+    /// The ground itself.
+    pub fn ground() -> Self {
+        let (o, one) = (S::zero(), S::one());
+        FrameState { rotation: [[one, o, o], [o, one, o], [o, o, one]], position: [o; 3], velocity: Motion::zero() }
+    }
+}
+
 impl<S: Scalar, T: Trace> Sweep<S, T> {
     /// `Ω_i = X_i Ω_λ + E v` from given velocities.
     pub(super) const VELOCITY: Self = Sweep {

@@ -64,6 +64,7 @@ pub(super) struct AccelerationLevel;
 pub(super) struct PositionLevel;
 
 impl Level for VelocityLevel {
+    #[inline(always)]
     fn problem<'b, S: Scalar>(given: &'b Arguments<'_, S>, w: &'b mut Workspace<S>) -> Problem<'b, S> {
         let (p, drive, rows) = (given.second, given.inputs.drive_v, w.constraints.rhs.as_slice());
         let load = Load { p, drive, seeds: None, rows, what: Quantity::Velocity };
@@ -79,6 +80,7 @@ impl Level for AccelerationLevel {
         cx.w.drive.fill(S::zero());
     }
 
+    #[inline(always)]
     fn problem<'b, S: Scalar>(_: &'b Arguments<'_, S>, w: &'b mut Workspace<S>) -> Problem<'b, S> {
         let (p, drive, rows) = (w.generalized.as_slice(), w.drive.as_slice(), w.constraints.rhs.as_slice());
         let load = Load { p, drive, seeds: Some(&w.force), rows, what: Quantity::Acceleration };
@@ -93,6 +95,7 @@ impl Level for PositionLevel {
         cx.w.drive.fill(S::zero());
     }
 
+    #[inline(always)]
     fn problem<'b, S: Scalar>(_: &'b Arguments<'_, S>, w: &'b mut Workspace<S>) -> Problem<'b, S> {
         let (p, drive, rows) = (w.generalized.as_slice(), w.drive.as_slice(), w.constraints.rhs.as_slice());
         let load = Load { p, drive, seeds: None, rows, what: Quantity::Constraint };
@@ -110,8 +113,10 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
                 cx.sweeps.bias_momentum_begin(&x.load, x.solution);
             },
             end: |cx| {
-                let x = L::problem(cx.given, cx.w);
-                cx.sweeps.bias_momentum_ground(x.factor, &x.load, x.solution);
+                if cx.sweeps.has_unknowns() {
+                    let x = L::problem(cx.given, cx.w);
+                    cx.sweeps.bias_momentum_ground(x.factor, &x.load, x.solution);
+                }
             },
             carried: |cx, i, visit| visit_force(&mut L::problem(cx.given, cx.w).solution.d[i], visit),
             running: |cx, visit| {
@@ -126,8 +131,10 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
     pub(super) const fn motion<L: Level>() -> Self {
         Sweep {
             begin: |cx| {
-                let x = L::problem(cx.given, cx.w);
-                cx.sweeps.motion_ground(x.factor, &x.load, x.solution);
+                if cx.sweeps.has_unknowns() {
+                    let x = L::problem(cx.given, cx.w);
+                    cx.sweeps.motion_ground(x.factor, &x.load, x.solution);
+                }
             },
             carried: |cx, i, visit| visit_motion(&mut L::problem(cx.given, cx.w).solution.omega[i], visit),
             running: |cx, visit| {

@@ -29,7 +29,7 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
     /// `T*_i = T_i + Σ Xᵀ T*_c` (4.22) of external wrenches.
     pub(super) const WRENCHES: Self = Sweep {
         waits: false,
-        needed: |tree| !tree.wrenches.is_empty(),
+        needed: |tree| !T::PLAIN && !tree.wrenches.is_empty(),
         rolls: |_| false,
         begin: |cx| {
             cx.sweeps.wrench_loads(&cx.given.inputs, cx.w);
@@ -58,6 +58,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Before the first [`Sweeps::moment_node`]: every body by itself.
+    #[inline(always)]
     fn moment_begin(&self, w: &mut Workspace<S>) {
         w.loads.ground_moment = self.tree.ground_moment;
         for (i, node) in self.tree.nodes.iter().enumerate() {
@@ -137,6 +138,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Gravity's wrench on the subtree of node `i`, in its frame: `(m g, s × g)`.
+    #[inline(always)]
     pub(super) fn weight(&self, w: &Workspace<S>, i: usize) -> Force<S> {
         let g = w.loads.gravity[i];
         let m = w.loads.mass[i];

@@ -40,7 +40,7 @@ pub use kinematics::FrameState;
 pub use newton::Accelerations;
 
 use crate::spatial::{ElementaryTransform, RigidInertia};
-use crate::tree::{Tree, TreeFrame};
+use crate::tree::{Elimination, Tree, TreeFrame};
 use crate::Scalar;
 
 /// What a sweep is about to compute; a symbolic run labels its nodes with it.
@@ -88,6 +88,9 @@ pub enum Quantity {
 pub trait Trace {
     /// Whether it listens at all.
     const LISTENS: bool = true;
+    /// Whether the tree is known to be [plain](Tree::is_plain): then the sweeps are compiled without all that only other
+    /// trees need.
+    const PLAIN: bool = false;
 
     /// The next operations belong to this node (`None`: the ground) and quantity.
     fn at(&self, _node: Option<usize>, _what: Quantity) {}
@@ -100,6 +103,18 @@ pub trait Trace {
 impl Trace for () {
     const LISTENS: bool = false;
 }
+
+/// Listens to nothing, on a [plain](Tree::is_plain) tree.
+#[derive(Clone, Copy, Debug)]
+pub struct Plain;
+
+impl Trace for Plain {
+    const LISTENS: bool = false;
+    const PLAIN: bool = true;
+}
+
+/// The elimination of every node of a plain tree.
+const PLAIN: &Elimination = &Elimination::PLAIN;
 
 /// What is given with every call beside the state.
 #[derive(Clone, Copy, Debug)]
@@ -132,12 +147,22 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
     /// about open columns.
     #[inline(always)]
     fn has_unknowns(&self) -> bool {
-        !self.tree.unknowns.is_empty()
+        !T::PLAIN && !self.tree.unknowns.is_empty()
+    }
+
+    /// How the freedoms of node `i` are eliminated: a constant where the tree is known to be plain.
+    #[inline(always)]
+    fn elimination(&self, i: usize) -> &Elimination {
+        match T::PLAIN {
+            true => PLAIN,
+            false => &self.tree.nodes[i].elimination,
+        }
     }
 
     /// Inertia of the body of node `i` in the node frame.
+    #[inline(always)]
     fn inertia<'b>(&'b self, w: &'b crate::workspace::Poses<S>, i: usize) -> &'b RigidInertia<S> {
-        match self.tree.nodes[i].elimination.non_rotating {
+        match self.elimination(i).non_rotating {
             true => &w.body[i].inertia,
             false => &self.tree.nodes[i].inertia,
         }

@@ -5,7 +5,7 @@
 use super::level::{AccelerationLevel, PositionLevel, VelocityLevel};
 use super::pass::{Arguments, Context, Results, Sweep, SweepList};
 use super::{Accelerations, FrameState, Inputs, Sweeps, Trace};
-use crate::tree::TreeFrame;
+use crate::tree::{Tree, TreeFrame};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
@@ -176,7 +176,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         qd: &mut [S],
         pd: &mut [S],
     ) {
-        self.context(&Arguments::new(q, p, u), w, Results { v, qd, p: pd, ..Results::none() }).run(SweepList::RATES);
+        let (given, results) = (Arguments::new(q, p, u), Results { v, qd, p: pd, ..Results::none() });
+        if T::PLAIN {
+            self.articulate(q, u.drive_q, &mut w.poses);
+            return plain_rates(self.tree, self.trace, &given, w, results);
+        }
+        self.context(&given, w, results).run(SweepList::RATES);
     }
 
     /// Kinetic and potential energy, J. The potential is zero with every moving mass at the height of the ground's
@@ -370,4 +375,17 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             *out = self.frame_acceleration(frame, w);
         }
     }
+}
+
+/// [`Sweeps::rates`] of a plain tree after its joints' steps. A function of its own, to which nobody else has references:
+/// so the compiler knows that the lengths of the vectors stay what they are.
+#[inline(never)]
+fn plain_rates<S: Scalar, T: Trace>(
+    tree: &Tree<S>,
+    trace: &T,
+    given: &Arguments<'_, S>,
+    w: &mut Workspace<S>,
+    results: Results<'_, S>,
+) {
+    Sweeps { tree, trace }.context(given, w, results).run_together(SweepList::RATES);
 }

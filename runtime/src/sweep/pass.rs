@@ -198,6 +198,51 @@ impl<S: Scalar, T: Trace> Context<'_, S, T> {
         (list.finish)(self);
     }
 
+    /// [`Context::run`] after [`Context::articulate`] for an output that takes a plain tree one pass inward and one
+    /// outward (as [`passes`] says): all sweeps of a pass visit a node together, while its numbers are at hand.
+    #[inline(always)]
+    pub(super) fn run_together<const N: usize>(&mut self, list: SweepList<S, T, N>) {
+        debug_assert!(passes(&list.sweeps, self.sweeps.tree).len() <= 2, "a plain tree is visited more often");
+        self.pass(&list.sweeps, SweepDirection::TipToBase);
+        self.pass(&list.sweeps, SweepDirection::BaseToTip);
+        (list.finish)(self);
+    }
+
+    /// All sweeps of one direction together, as far as a tree needs them.
+    #[inline(always)]
+    fn pass<const N: usize>(&mut self, sweeps: &[Sweep<S, T>; N], direction: SweepDirection) {
+        let tree = self.sweeps.tree;
+        macro_rules! each {
+            (|$sweep:ident| $run:expr) => {
+                each!(@ $sweep, $run, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15)
+            };
+            (@ $sweep:ident, $run:expr, $($k:literal)*) => {
+                const { assert!(N <= [$($k),*].len(), "more sweeps than are unrolled") };
+                $(if $k < N && sweeps[$k].direction == direction && (sweeps[$k].needed)(tree) {
+                    let $sweep = &sweeps[$k];
+                    $run;
+                })*
+            };
+        }
+        each!(|sweep| (sweep.begin)(self));
+        {
+            let cx = &mut self.reborrowed();
+            match direction {
+                SweepDirection::TipToBase => {
+                    for i in (0..tree.nodes.len()).rev() {
+                        each!(|sweep| (sweep.node)(cx, i));
+                    }
+                }
+                SweepDirection::BaseToTip => {
+                    for i in 0..tree.nodes.len() {
+                        each!(|sweep| (sweep.node)(cx, i));
+                    }
+                }
+            }
+        }
+        each!(|sweep| (sweep.end)(self));
+    }
+
     /// Steps of all joints from the coordinates: what every list of sweeps starts from.
     pub fn articulate(&mut self) {
         self.sweeps.articulate(self.given.q, self.given.inputs.drive_q, &mut self.w.poses);

@@ -10,10 +10,10 @@ use crate::Scalar;
 impl<S: Scalar, T: Trace> Sweep<S, T> {
     /// `P*` of the nodes whose momentum rates come from it.
     pub(super) const ACCUMULATED_MOMENTA: Self = Sweep {
-        needed: |tree| tree.nodes.iter().any(|node| node.elimination.accumulates_momentum),
+        needed: |tree| !T::PLAIN && tree.nodes.iter().any(|node| node.elimination.accumulates_momentum),
         begin: |cx| cx.sweeps.accumulate_begin(cx.w),
         carried: |cx, i, visit| {
-            if cx.sweeps.tree.nodes[i].elimination.accumulates_momentum {
+            if cx.sweeps.elimination(i).accumulates_momentum {
                 visit_force(&mut cx.w.force[i], visit);
             }
         },
@@ -31,7 +31,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// `P*` of the nodes whose momentum rates come from it, in the frames they are eliminated in. Its component along a
     /// node's own axis is known: `EᵀP* = p − armature · rate`, less what couplings hold of `p`.
     fn accumulate_begin(&self, w: &mut Workspace<S>) {
-        for i in (0..self.tree.nodes.len()).filter(|&i| self.tree.nodes[i].elimination.accumulates_momentum) {
+        for i in (0..self.tree.nodes.len()).filter(|&i| self.elimination(i).accumulates_momentum) {
             self.trace.at(Some(i), Quantity::Momentum);
             w.force[i] = self.inertia(&w.poses, i).momentum(&w.velocity.omega[i]);
         }
@@ -42,11 +42,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     fn accumulate_node(&self, i: usize, p: &[S], w: &mut Workspace<S>) {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Momentum);
-        if node.elimination.accumulates_momentum {
+        if self.elimination(i).accumulates_momentum {
             w.force[i] = self.leaving(&w.poses, i).force(w.force[i]);
         }
-        let Some(parent) = node.parent.filter(|&p| self.tree.nodes[p].elimination.accumulates_momentum) else { return };
-        let mut total = match node.elimination.accumulates_momentum {
+        let Some(parent) = node.parent.filter(|&p| self.elimination(p).accumulates_momentum) else { return };
+        let mut total = match self.elimination(i).accumulates_momentum {
             true => w.force[i],
             false => {
                 let (motion, d) = self.acting(&w.first, &w.factor, &w.velocity, i);
@@ -54,7 +54,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             }
         };
         if let (Freedom::Unit(z), 1, Source::State { v, .. }) = (node.kind.axis(0), node.kind.nv(), node.source) {
-            if node.elimination.unknown.is_none() || node.elimination.deferred {
+            if self.elimination(i).unknown.is_none() || self.elimination(i).deferred {
                 let rotor = node.passive[0].armature * w.velocity.rate[w.first[i]];
                 *total.get_mut(z) = p[v] - rotor - self.coupled_momentum(i, &w.constraints.multipliers);
             }
@@ -70,7 +70,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         let Source::State { v, .. } = node.source else { return };
         self.trace.at(Some(i), Quantity::MomentumRate);
-        if node.elimination.accumulates_momentum {
+        if self.elimination(i).accumulates_momentum {
             let mut motion = w.velocity.hat[i];
             node.kind.axis(0).add_to(&mut motion, w.velocity.rate[w.first[i]]);
             let axis = node.kind.axis(0);
@@ -109,7 +109,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     #[inline(always)]
     pub(super) fn applied(&self, w: &Workspace<S>, i: usize, axis: &Freedom<S>) -> S {
         let weight = axis.dot(&self.weight(w, i));
-        if self.tree.wrenches.is_empty() {
+        if T::PLAIN || self.tree.wrenches.is_empty() {
             return weight;
         }
         weight + axis.dot(&w.loads.total[i])

@@ -6,7 +6,7 @@
 use super::level::Load;
 use super::{name, Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Motion};
-use crate::tree::{for_component, for_freedom, Freedom, Source, Unknown};
+use crate::tree::{each_freedom, for_component, Freedom, Source, Unknown};
 use crate::workspace::{Factor, Poses, Solution};
 use crate::Scalar;
 
@@ -37,18 +37,16 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.trace.at(Some(i), Quantity::BiasMomentum);
         name::force(self.trace, "d", &sol.d[i]);
         let mut d = sol.d[i]; // D_i (4.49)
-        if node.elimination.before_joint {
+        if self.elimination(i).before_joint {
             d = self.leaving(poses, i).force(d);
         }
-        for (k, &g) in node.elimination.solve_before.iter().enumerate() {
-            let e = self.unknown_bias_momentum(g, f, load, sol, node.elimination.open_before(k + 1));
+        for (k, &g) in self.elimination(i).solve_before.iter().enumerate() {
+            let e = self.unknown_bias_momentum(g, f, load, sol, self.elimination(i).open_before(k + 1));
             d = d.plus(&f.unknown_pivots[g].u.times(e));
         }
-        for k in 0..node.kind.nv() {
-            self.bias_momentum(i, k, first[i] + k, f, load, sol, &mut d);
-        }
-        for (k, &g) in node.elimination.solve_after.iter().enumerate() {
-            let e = self.unknown_bias_momentum(g, f, load, sol, node.elimination.open_after(k + 1));
+        each_freedom!(node.kind, |k, axis| self.bias_momentum(i, k, axis, first[i] + k, f, load, sol, &mut d));
+        for (k, &g) in self.elimination(i).solve_after.iter().enumerate() {
+            let e = self.unknown_bias_momentum(g, f, load, sol, self.elimination(i).open_after(k + 1));
             d = d.plus(&f.unknown_pivots[g].u.times(e));
         }
         sol.d[i] = d; // D'_i (4.45)
@@ -67,23 +65,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// Own freedom `k` of node `i` in the sweep from tip to base.
-    fn bias_momentum(
-        &self,
-        i: usize,
-        k: usize,
-        freedom: usize,
-        f: &Factor<S>,
-        load: &Load<S>,
-        sol: &mut Solution<S>,
-        d: &mut Force<S>,
-    ) {
-        for_freedom!(self.tree.nodes[i].kind, k, |axis| self.bias_momentum_along(i, k, axis, freedom, f, load, sol, d));
-    }
-
-    /// [`Sweeps::bias_momentum`] for a freedom along `axis`.
+    /// Own freedom `k` of node `i`, along `axis`, in the sweep from tip to base.
     #[inline(always)]
-    fn bias_momentum_along(
+    fn bias_momentum(
         &self,
         i: usize,
         k: usize,
@@ -96,7 +80,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     ) {
         let node = &self.tree.nodes[i];
         let pivot = &f.pivots[freedom];
-        if let Some(g) = node.elimination.unknown {
+        if let Some(g) = self.elimination(i).unknown {
             sol.unknown_rate[g] = sol.unknown_rate[g] + node.ratio * axis.dot(d);
             return;
         }
@@ -116,7 +100,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         };
         if self.has_unknowns() {
             let ng = self.tree.unknowns.len();
-            for h in node.elimination.open_after(0) {
+            for h in self.elimination(i).open_after(0) {
                 sol.unknown_rate[h] = sol.unknown_rate[h] + f.cross[freedom * ng + h] * e;
             }
         }
@@ -174,19 +158,19 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         sol.hat[i] = hat; // Ω̂_i
         let [hat_letter, letter, rate_letter] = load.letters();
         name::motion(self.trace, hat_letter, &hat);
-        for (k, &g) in node.elimination.solve_after.iter().enumerate().rev() {
-            self.unknown_motion(g, f, &hat, node.elimination.open_after(k + 1), sol);
+        for (k, &g) in self.elimination(i).solve_after.iter().enumerate().rev() {
+            self.unknown_motion(g, f, &hat, self.elimination(i).open_after(k + 1), sol);
         }
         let mut omega = hat;
-        for k in (0..node.kind.nv()).rev() {
-            let rate = for_freedom!(node.kind, k, |axis| self.rate_along(i, axis, first[i] + k, f, sol, &mut omega));
+        each_freedom!(node.kind, rev, |k, axis| {
+            let rate = self.rate_along(i, axis, first[i] + k, f, sol, &mut omega);
             sol.rate[first[i] + k] = rate;
             self.trace.name(rate, rate_letter, "");
+        });
+        for (k, &g) in self.elimination(i).solve_before.iter().enumerate().rev() {
+            self.unknown_motion(g, f, &omega, self.elimination(i).open_before(k + 1), sol);
         }
-        for (k, &g) in node.elimination.solve_before.iter().enumerate().rev() {
-            self.unknown_motion(g, f, &omega, node.elimination.open_before(k + 1), sol);
-        }
-        if node.elimination.before_joint {
+        if self.elimination(i).before_joint {
             omega = self.leaving(poses, i).motion(omega);
         }
         sol.omega[i] = omega; // Ω_i
@@ -205,7 +189,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         omega: &mut Motion<S>,
     ) -> S {
         let node = &self.tree.nodes[i];
-        let rate = match (node.elimination.unknown, node.source) {
+        let rate = match (self.elimination(i).unknown, node.source) {
             (Some(g), _) => node.ratio * sol.unknown_rate[g],
             (None, Source::Drive { .. }) => sol.e[freedom],
             (None, Source::State { .. }) => {
@@ -233,7 +217,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// A rate less what the rates of open unknowns contribute to it.
     fn less_open(&self, i: usize, freedom: usize, f: &Factor<S>, unknown_rate: &[S], rate: S) -> S {
         let (ng, rho) = (self.tree.unknowns.len(), f.pivots[freedom].rho);
-        let open = self.tree.nodes[i].elimination.open_after(0);
+        let open = self.elimination(i).open_after(0);
         open.fold(rate, |rate, h| rate - rho * f.cross[freedom * ng + h] * unknown_rate[h])
     }
 
@@ -274,11 +258,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub(super) fn acting(&self, first: &[usize], f: &Factor<S>, sol: &Solution<S>, i: usize) -> (Motion<S>, Force<S>) {
         let (n, node) = (self.tree.nodes.len(), &self.tree.nodes[i]);
         let (mut motion, mut own) = (sol.hat[i], None);
-        if node.elimination.deferred {
+        if self.elimination(i).deferred {
             node.kind.axis(0).add_to(&mut motion, sol.rate[first[i]]);
-            own = node.elimination.unknown;
+            own = self.elimination(i).unknown;
         }
-        let open = node.elimination.open.iter().chain(&node.elimination.ends).filter(|&&g| Some(g) != own);
+        let open = self.elimination(i).open.iter().chain(&self.elimination(i).ends).filter(|&&g| Some(g) != own);
         (motion, open.fold(sol.d[i], |d, &g| d.plus(&f.columns[g * n + i].times(sol.unknown_rate[g]))))
     }
 
@@ -287,7 +271,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub(super) fn collect_rate_node(&self, i: usize, sol: &Solution<S>, first: &[usize], v: &mut [S]) {
         let node = &self.tree.nodes[i];
         let Source::State { v: at, .. } = node.source else { return };
-        match node.elimination.unknown {
+        match self.elimination(i).unknown {
             Some(g) => v[at] = sol.unknown_rate[g],
             None => v[at..at + node.kind.nv()].copy_from_slice(&sol.rate[first[i]..first[i + 1]]),
         }

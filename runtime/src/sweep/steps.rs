@@ -22,7 +22,7 @@ impl<'b, S: Scalar> Steps<'b, S> {
     pub fn motion(self, mut m: Motion<S>) -> Motion<S> {
         for run in self.runs {
             for step in run {
-                m = step.motion(&m);
+                step.carry_motion(&mut m);
             }
         }
         m
@@ -32,7 +32,7 @@ impl<'b, S: Scalar> Steps<'b, S> {
     pub fn vector(self, mut x: Vec3<S>) -> Vec3<S> {
         for run in self.runs {
             for step in run {
-                x = step.vector(x);
+                step.carry_vector(&mut x);
             }
         }
         x
@@ -42,7 +42,7 @@ impl<'b, S: Scalar> Steps<'b, S> {
     pub fn force(self, mut f: Force<S>) -> Force<S> {
         for run in self.runs.into_iter().rev() {
             for step in run.iter().rev() {
-                f = step.force(&f);
+                step.carry_force(&mut f);
             }
         }
         f
@@ -73,14 +73,14 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// does.
     #[inline]
     pub(super) fn placement_turns(&self, i: usize) -> bool {
-        self.tree.nodes[i].parent.is_some_and(|p| self.tree.nodes[p].elimination.non_rotating)
+        !T::PLAIN && self.tree.nodes[i].parent.is_some_and(|p| self.elimination(p).non_rotating)
     }
 
     /// Constant steps from the parent frame to the joint of node `i`: none where the placement turns, and its steps are
     /// among those of the joint.
     #[inline]
     pub(super) fn place<'b>(&'b self, w: &'b Poses<S>, i: usize) -> &'b [ElementaryTransform<S>] {
-        match w.joint[i].placing().is_empty() {
+        match T::PLAIN || w.joint[i].placing().is_empty() {
             true => &self.tree.nodes[i].place,
             false => &[],
         }
@@ -96,14 +96,14 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     #[inline]
     pub(super) fn entering<'b>(&'b self, w: &'b Poses<S>, i: usize) -> Steps<'b, S> {
         let joint = &w.joint[i];
-        let steps = if self.tree.nodes[i].elimination.before_joint { joint.placing() } else { joint.get() };
+        let steps = if self.elimination(i).before_joint { joint.placing() } else { joint.get() };
         Steps { runs: [self.place(w, i), steps] }
     }
 
     /// The rest: from there to the node frame.
     #[inline]
     pub(super) fn leaving<'b>(&'b self, w: &'b Poses<S>, i: usize) -> Steps<'b, S> {
-        let own = if self.tree.nodes[i].elimination.before_joint { w.joint[i].own() } else { &[] };
+        let own = if self.elimination(i).before_joint { w.joint[i].own() } else { &[] };
         Steps { runs: [own, &[]] }
     }
 }

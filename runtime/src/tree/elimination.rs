@@ -34,6 +34,20 @@ pub struct Elimination {
 }
 
 impl Elimination {
+    /// The default, as a constant.
+    pub(crate) const PLAIN: Elimination = Elimination {
+        unknown: None,
+        deferred: false,
+        before_joint: false,
+        non_rotating: false,
+        accumulates_momentum: false,
+        ends: Vec::new(),
+        screws: Vec::new(),
+        open: Vec::new(),
+        solve_before: Vec::new(),
+        solve_after: Vec::new(),
+    };
+
     /// Unknowns still open after position `k` of `solve_before`.
     #[inline]
     pub(crate) fn open_before(&self, k: usize) -> impl Iterator<Item = usize> + Clone + '_ {

@@ -58,6 +58,7 @@ impl<S: Scalar> Node<S> {
             phase: of(self.phase),
             quarter: self.quarter,
             slide: of(self.slide),
+            slides: self.slides,
             inertia: RigidInertia {
                 mass: of(inertia.mass),
                 moment: inertia.moment.map(of),

@@ -1,27 +1,36 @@
 //! Expressions that are compiled apart for each value of a number, which is a constant in them: entries of vectors and
 //! matrices are then found without computing their places.
 
-/// Evaluates an expression with column `k` of a joint matrix. It is compiled apart for the commonest kinds of joints,
-/// whose column is a constant then.
-macro_rules! for_freedom {
-    ($kind:expr, $k:expr, |$axis:ident| $result:expr) => {
+/// Evaluates an expression with the number and the column of every freedom of a joint, in order or, with `rev`, in the
+/// reverse order. It is compiled apart for the commonest kinds of joints, which have one freedom whose column is a
+/// constant.
+macro_rules! each_freedom {
+    ($kind:expr, |$k:ident, $axis:ident| $result:expr) => {
+        each_freedom!(@ $kind, (0..), |$k, $axis| $result)
+    };
+    ($kind:expr, rev, |$k:ident, $axis:ident| $result:expr) => {
+        each_freedom!(@ $kind, (0..).rev, |$k, $axis| $result)
+    };
+    (@ $kind:expr, (0..) $(.$rev:ident)?, |$k:ident, $axis:ident| $result:expr) => {
         match $kind {
             $crate::tree::Kind::Revolute => {
-                let $axis = $crate::tree::Kind::Revolute.axis($k);
+                let ($k, $axis) = (0, $crate::tree::Kind::Revolute.axis(0));
                 $result
             }
             $crate::tree::Kind::Prismatic => {
-                let $axis = $crate::tree::Kind::Prismatic.axis($k);
+                let ($k, $axis) = (0, $crate::tree::Kind::Prismatic.axis(0));
                 $result
             }
             kind => {
-                let $axis = kind.axis($k);
-                $result
+                for $k in (0..kind.nv())$(.$rev())? {
+                    let $axis = kind.axis($k);
+                    $result
+                }
             }
         }
     };
 }
-pub(crate) use for_freedom;
+pub(crate) use each_freedom;
 
 /// Evaluates an expression with the number of a component, 0–5. It is compiled once for every number, which is a constant
 /// then.

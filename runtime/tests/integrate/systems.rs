@@ -101,6 +101,7 @@ pub fn rotor() -> Interpreter<f64> {
         phase: o,
         quarter: 0,
         slide: o,
+        slides: false,
         inertia: RigidInertia { mass: one, moment: [o; 3], inertia: [1.0, o, o, 2.0, o, 3.0] },
         passive: vec![passive; 3],
         elimination: Elimination::default(),
