@@ -258,6 +258,10 @@ pub struct EvalArgs {
     /// Angles this close to right angles are taken as exact, rad
     #[arg(long, value_name = "RAD", default_value_t = 0.0, value_parser = snap)]
     pub snap: f64,
+    /// Evaluate any number of states with the interpreter: the same numbers as the machine code that is otherwise made of
+    /// the model for a thousand states or more
+    #[arg(long)]
+    pub interpreted: bool,
     /// File to write in place of standard output
     #[arg(short = 'o', long, value_name = "FILE")]
     pub output: Option<PathBuf>,
