@@ -217,6 +217,7 @@ pub enum Completions {
 #[command(
     after_help = "Counted are additions, multiplications and divisions, and their sum; square roots and pairs of a sine and a cosine are
 counted separately. The sweeps of each output are listed below it; operations that a sweep shares with an earlier one are counted there.
+Of mechanisms with more than 600 bodies, the code that is generated is counted: of rolled code, every turn of a loop.
 For serial chains of three or more revolute joints on a fixed base, published formulas stand beside."
 )]
 pub struct CountArgs {
