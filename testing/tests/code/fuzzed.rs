@@ -24,7 +24,7 @@ fn options(seed: u64) -> Options {
 /// branches, one is a chain.
 fn mechanism(seed: u64) -> (Plan, State) {
     let quick = PlanOptions::quick();
-    let closed = (seed % 5 == 0).then(|| movable_loops(seed, &LoopKnobs::everything(seed, 4))).flatten();
+    let closed = seed.is_multiple_of(5).then(|| movable_loops(seed, &LoopKnobs::everything(seed, 4))).flatten();
     if let Some(system) = closed {
         return (search::plan(&system.model, quick), system.state);
     }
