@@ -1,7 +1,6 @@
 //! Digits that a state leaves to its results: the condition of the mass matrix, and coordinates too large for angles.
 
 use multibody::codegen::plan::Plan;
-use multibody::runtime::Interpreter;
 
 /// Velocities of the largest mass matrix whose condition is computed: the time grows with the cube of their number.
 pub const LARGEST: usize = 1000;
@@ -50,19 +49,19 @@ fn condition(m: &[f64], n: usize) -> (f64, usize) {
     (norm * largest_sum(&inverse), least.1)
 }
 
-/// What the mass matrix leaves of the digits of velocities and accelerations at coordinates `q`: a warning and its
-/// help, where that is none. Large matrices are not looked at.
+/// What the mass matrix, which `matrix` writes row by row, leaves of the digits of velocities and accelerations: a
+/// warning and its help, where that is none. Large matrices are not looked at.
 ///
 /// The numbers of a model are known to a rounding, and so are the entries of `M`: relative to the scaled matrix, an
 /// error of at most `n ε` in the norm of row sums. The solution of `M v = p` then changes by `n ε κ` of its size to
 /// first order, whatever the algorithm (Higham, *Accuracy and Stability of Numerical Algorithms*, 2002, section 7.1).
-pub fn of_mass_matrix(plan: &Plan, interpreter: &mut Interpreter<f64>, q: &[f64]) -> Option<(String, String)> {
+pub fn of_mass_matrix(plan: &Plan, matrix: impl FnOnce(&mut [f64])) -> Option<(String, String)> {
     let n = plan.dims.nv;
     if n == 0 || n > LARGEST {
         return None;
     }
     let mut m = vec![0.0; n * n];
-    interpreter.mass_matrix(q, &mut m);
+    matrix(&mut m);
     let (condition, at) = condition(&m, n);
     if n as f64 * f64::EPSILON * condition <= NO_DIGIT {
         return None;

@@ -4,13 +4,14 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
 
+use multibody::codegen::code::{compile, Code};
 use multibody::codegen::generate::quantity;
 use multibody::codegen::generate::trace;
 use multibody::codegen::model::{Gravity, Model, Value};
 use multibody::codegen::options::{EliminationStrategy, PlanOptions};
 use multibody::codegen::plan::Plan;
 use multibody::codegen::search::{self, Candidate, Chosen};
-use multibody::codegen::symbolic::Counts;
+use multibody::codegen::symbolic::{Cost, Counts};
 use multibody::codegen::{Arithmetic, Options, Output};
 use serde_json::json;
 
@@ -28,6 +29,8 @@ pub struct OutputCounts {
     pub counts: Counts,
     /// Count of each sweep.
     pub sweeps: Vec<(&'static str, Counts)>,
+    /// Whether the operations are those of loops over like links.
+    pub rolled: bool,
 }
 
 /// Estimated speed of one output in one arithmetic, on the processor of the cost model.
@@ -42,21 +45,41 @@ struct Speed {
     bounds: [f64; 2],
 }
 
+/// Bodies up to which straight-line code is counted, although rolled code is generated. Tracing it takes a millisecond for
+/// each body, output and arithmetic, and a kilobyte for each operation.
+const UNROLLED: usize = 600;
+
+/// The code of an output: straight-line code, or for long chains the loops over like links that are generated.
+fn code(plan: &Plan, group: Output, options: &Options) -> Outcome<Code> {
+    let program = match plan.nodes.len() > UNROLLED {
+        true => compile(plan, group, options).map_err(generate::failure)?,
+        false => trace(plan, group, options).map_err(generate::failure)?.map(Code::Straight),
+    };
+    Ok(program.program)
+}
+
 /// Estimated speeds of every output in exact and in fast arithmetic.
 fn speeds(plan: &Plan, options: &Options) -> Outcome<Vec<Speed>> {
     let mut speeds = Vec::new();
     for &group in &options.outputs {
         for arithmetic in [Arithmetic::Exact, Arithmetic::Fast] {
-            let program =
-                trace(plan, group, &Options { arithmetic, ..options.clone() }).map_err(generate::failure)?.program;
-            speeds.push(Speed {
-                group,
-                arithmetic,
-                counts: program.counts(),
-                instructions: program.instructions(),
-                critical_path: program.critical_path(),
-                throughput: program.throughput(),
-                bounds: [program.bound(), program.bound_of_lanes()],
+            let code = code(plan, group, &Options { arithmetic, ..options.clone() })?;
+            let counts = code.counts();
+            speeds.push(match &code {
+                Code::Straight(program) => Speed {
+                    group,
+                    arithmetic,
+                    counts,
+                    instructions: program.instructions(),
+                    critical_path: program.critical_path(),
+                    throughput: program.throughput(),
+                    bounds: [program.bound(), program.bound_of_lanes()],
+                },
+                Code::Rolled(program) => {
+                    let Cost { instructions, critical_path, throughput, .. } = program.cost();
+                    let bounds = program.bounds();
+                    Speed { group, arithmetic, counts, instructions, critical_path, throughput, bounds }
+                }
             });
         }
     }
@@ -117,6 +140,10 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
         gravity(&plan)
     )?;
     table(&counts, &options.outputs, out)?;
+    let rolled: Vec<&str> = counts.iter().filter(|c| c.rolled).map(|c| c.group.name()).collect();
+    if !rolled.is_empty() {
+        writeln!(out, "\nOf rolled code, loops over like links, times the number of turns: {}", rolled.join(", "))?;
+    }
     speed_table(&speeds, out)?;
     candidates(&plan, &tried, &options, args.candidates, out)?;
     rivals(&plan, &counts, out)?;
@@ -198,11 +225,16 @@ pub fn all(plan: &Plan, options: &Options) -> Outcome<Vec<OutputCounts>> {
 }
 
 fn of_output(plan: &Plan, group: Output, options: &Options) -> Outcome<OutputCounts> {
-    let program = trace(plan, group, options).map_err(generate::failure)?.program;
-    let quantities: BTreeSet<_> = program.steps.iter().map(|(_, _, (_, what))| *what).collect();
-    let sweeps = quantities.into_iter().map(|q| (quantity(q), program.counts_where(|label| label.1 == q)));
+    let code = code(plan, group, options)?;
+    let steps = code.blocks().into_iter().flat_map(|program| &program.steps);
+    let quantities: BTreeSet<_> = steps.map(|(_, _, (_, what))| *what).collect();
+    let of = |what| match &code {
+        Code::Straight(program) => program.counts_where(|label| label.1 == what),
+        Code::Rolled(program) => program.counts_where(|label| label.1 == what),
+    };
+    let sweeps = quantities.into_iter().map(|what| (quantity(what), of(what)));
     let sweeps = sweeps.filter(|(_, c)| *c != Counts::default()).collect();
-    Ok(OutputCounts { group, counts: program.counts(), sweeps })
+    Ok(OutputCounts { group, counts: code.counts(), sweeps, rolled: matches!(code, Code::Rolled(_)) })
 }
 
 /// The table of counts, with a row for each sweep of the outputs in `detailed`.
@@ -246,9 +278,7 @@ pub fn rivals(plan: &Plan, counts: &[OutputCounts], out: &mut dyn Write) -> Outc
 
 /// Differences of the count of one output when parts of the model are left out.
 fn parts(plan: &Plan, options: &Options, group: Output) -> Outcome<Vec<Part>> {
-    let total = |plan: &Plan, options: &Options| -> Outcome<usize> {
-        Ok(trace(plan, group, options).map_err(generate::failure)?.program.counts().total())
-    };
+    let total = |plan: &Plan, options: &Options| -> Outcome<usize> { Ok(code(plan, group, options)?.counts().total()) };
     let changed = |change: &dyn Fn(&mut Model)| -> Outcome<usize> {
         let mut model = plan.model.clone();
         change(&mut model);
@@ -318,6 +348,7 @@ fn as_json(plan: &Plan, counts: &[OutputCounts], speeds: &[Speed], parts: &[Part
             let mut output = numbers(&c.counts);
             output.insert("output".into(), json!(c.group.name()));
             output.insert("sweeps".into(), json!(sweeps));
+            output.insert("rolled".into(), json!(c.rolled));
             for s in speeds.iter().filter(|s| s.group == c.group) {
                 let mut speed = numbers(&s.counts);
                 speed.insert("instructions".into(), json!(s.instructions));

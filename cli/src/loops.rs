@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use multibody::codegen::jit::Compiled;
 use multibody::codegen::model::{ConstraintKind, Model};
 use multibody::codegen::plan::Plan;
 use multibody::runtime::constrained::{close, complete, Closed, Closing, ConstraintError};
@@ -233,21 +234,20 @@ pub fn title(plan: &Plan, k: usize) -> Option<String> {
 }
 
 /// Description of the loops and couplings that a state violates by more than 1e-6.
-pub fn violated(plan: &Plan, interpreter: &mut Interpreter<f64>, q: &[f64], v: &[f64]) -> Vec<String> {
+pub fn violated(plan: &Plan, mechanism: &mut Compiled, q: &[f64], v: &[f64]) -> Vec<String> {
     const MOST: f64 = 1e-6;
     if plan.dims.rows == 0 {
         return Vec::new();
     }
     let q = q.to_vec();
-    let (mut residual, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
-    let (mut p, mut allowed, mut sigma) =
-        (interpreter.zero_momenta(), interpreter.zero_momenta(), interpreter.zero_rows());
-    interpreter.momenta(&q, v, &mut p);
-    interpreter.project_momenta(0.0, &q, &mut p, &mut allowed, &mut sigma);
-    interpreter.constraint_residuals(&q, &mut residual, &mut entries);
+    let (mut residual, mut entries) = (mechanism.zero_rows(), mechanism.zero_entries());
+    let (mut p, mut allowed, mut sigma) = (mechanism.zero_momenta(), mechanism.zero_momenta(), mechanism.zero_rows());
+    mechanism.momenta(&q, v, &mut p);
+    mechanism.project_momenta(0.0, &q, &mut p, &mut allowed, &mut sigma);
+    mechanism.constraint_residuals(&q, &mut residual, &mut entries);
     let mut worst = vec![[0.0_f64; 2]; plan.model.constraints.len()];
-    let columns = interpreter.entry_columns();
-    for (row, residual) in interpreter.rows().iter().zip(&residual) {
+    let columns = mechanism.entry_columns();
+    for (row, residual) in mechanism.rows().iter().zip(&residual) {
         let own = row.first..row.first + row.len;
         // Rates of the residuals, minus those that the row prescribes, which are the rates of `allowed`.
         let rate: f64 = own.map(|e| entries[e] * (v[columns[e]] - allowed[columns[e]])).sum();

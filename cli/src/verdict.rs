@@ -41,7 +41,7 @@ pub fn start(path: &Path, plan: &Plan, q: &[f64]) -> Outcome {
         ));
     }
     let mut interpreter = interpreter::<f64>(plan);
-    if let Some((what, help)) = condition::of_mass_matrix(plan, &mut interpreter, q) {
+    if let Some((what, help)) = condition::of_mass_matrix(plan, |m| interpreter.mass_matrix(q, m)) {
         warn(path, &format!("at the start, {what}"), &help);
     }
     Ok(())

@@ -99,13 +99,17 @@ pub struct LoopSystem {
 
 /// A random mechanism that can move: `Φ` has fewer independent rows than there are velocities. Where prescribed motions
 /// and loops contradict each other, the prescribed joints are at rest.
+///
+/// # Panics
+/// If none of a thousand mechanisms drawn from the distribution can move.
 pub fn random_loops(seed: u64, distribution: &LoopKnobs) -> LoopSystem {
-    for attempt in 0..1000 {
-        if let Some(system) = attempted(seed, attempt, distribution) {
-            return system;
-        }
-    }
-    panic!("seed {seed}: no mechanism drawn from this distribution can move: {distribution:?}")
+    movable_loops(seed, distribution)
+        .unwrap_or_else(|| panic!("seed {seed}: no mechanism drawn from this distribution can move: {distribution:?}"))
+}
+
+/// The same, or none where no mechanism of a thousand can move.
+pub fn movable_loops(seed: u64, distribution: &LoopKnobs) -> Option<LoopSystem> {
+    (0..1000).find_map(|attempt| attempted(seed, attempt, distribution))
 }
 
 fn attempted(seed: u64, attempt: u64, distribution: &LoopKnobs) -> Option<LoopSystem> {

@@ -217,6 +217,7 @@ pub enum Completions {
 #[command(
     after_help = "Counted are additions, multiplications and divisions, and their sum; square roots and pairs of a sine and a cosine are
 counted separately. The sweeps of each output are listed below it; operations that a sweep shares with an earlier one are counted there.
+Of mechanisms with more than 600 bodies, the code that is generated is counted: of rolled code, every turn of a loop.
 For serial chains of three or more revolute joints on a fixed base, published formulas stand beside."
 )]
 pub struct CountArgs {
@@ -258,6 +259,10 @@ pub struct EvalArgs {
     /// Angles this close to right angles are taken as exact, rad
     #[arg(long, value_name = "RAD", default_value_t = 0.0, value_parser = snap)]
     pub snap: f64,
+    /// Evaluate any number of states with the interpreter: the same numbers as the machine code that is otherwise made of
+    /// the model for a thousand states or more
+    #[arg(long)]
+    pub interpreted: bool,
     /// File to write in place of standard output
     #[arg(short = 'o', long, value_name = "FILE")]
     pub output: Option<PathBuf>,

@@ -77,6 +77,33 @@ fn files_that_cannot_be_read() {
     bad(run_in(&folder, &["check", "latin.toml"]), &["latin.toml:2:3: error: not UTF-8 text"]);
 }
 
+/// Rolled code of long chains is counted turn by turn: the operations are an affine function of the number of links, and the
+/// sweeps add up to them.
+#[test]
+fn counts_of_long_chains() {
+    let folder = folder("count_long");
+    let total = |n: usize| {
+        let link = |k: usize| {
+            let (parent, along) = if k == 0 { ("ground".to_string(), 0.0) } else { (format!("b{}", k - 1), 0.5) };
+            format!(
+                "[[body]]\nname = \"b{k}\"\nmass = 1\ncom = [0.25, 0, 0]\ninertia = [0.01, 0.02, 0.02]\n\
+                 [[joint]]\nname = \"j{k}\"\ntype = \"revolute\"\nparent = \"{parent}\"\nchild = \"b{k}\"\nxyz = [{along}, 0, 0]\n"
+            )
+        };
+        let text = format!("name = \"long\"\n{}", (0..n).map(link).collect::<String>());
+        let model = write(&folder, &format!("{n}.toml"), &text);
+        let output = json_of(&good(run(&["count", &model, "--outputs", "rates", "--json"])));
+        let rates = &output["outputs"][0];
+        assert_eq!(rates["rolled"], true);
+        let number = |v: &serde_json::Value| v["total"].as_u64().expect("a number");
+        let sweeps: u64 = rates["sweeps"].as_array().expect("sweeps").iter().map(number).sum();
+        assert_eq!(sweeps, number(rates));
+        number(rates)
+    };
+    let [a, b, c] = [610, 620, 640].map(total);
+    assert_eq!(2 * (b - a), c - b);
+}
+
 #[test]
 fn counts() {
     let output = good(run(&["count", "models/chain6.toml", "--outputs", "all", "--json"]));

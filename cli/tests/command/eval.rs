@@ -56,6 +56,37 @@ fn eval_agrees_with_pinocchio() {
 }
 
 #[test]
+fn many_states_have_the_numbers_of_the_interpreter() {
+    let folder = folder("eval_many");
+    let state = |k: u32| {
+        let x = f64::from(k);
+        json!({ "q": [x.sin(), (2.0 * x).cos()], "v": [0.3 * x.cos(), 0.1], "a": [0.2, x.sin()], "tau": [0.5, -x.cos()] })
+    };
+    let input = json!({ "states": (0..1000).map(state).collect::<Vec<_>>() });
+    let input = write(&folder, "states.json", &input.to_string());
+    let arguments = ["eval", "models/double_pendulum.toml", "--input", &input];
+    let compiled = good(run(&arguments));
+    assert!(err(&compiled).contains("states: 1000, evaluated by machine code (exact arithmetic"), "{}", err(&compiled));
+    let interpreted = good(run(&[&arguments[..], &["--interpreted"]].concat()));
+    assert!(
+        err(&interpreted).contains("states: 1000, evaluated by the interpreter (--interpreted)"),
+        "{}",
+        err(&interpreted)
+    );
+    let few = json!({ "states": (0..3).map(state).collect::<Vec<_>>() });
+    let few =
+        good(run(&["eval", "models/double_pendulum.toml", "--input", &write(&folder, "few.json", &few.to_string())]));
+    assert_eq!(err(&few), "");
+    let of = |output: &_| json_of(output)["states"].as_array().expect("states").clone();
+    for (a, b) in of(&compiled).iter().zip(&of(&interpreted)) {
+        for key in ["p", "qd", "pd", "qdd", "M", "h", "tau"] {
+            assert_eq!(numbers(&a[key]), numbers(&b[key]), "{key}");
+        }
+        assert_eq!((&a["kinetic"], &a["potential"]), (&b["kinetic"], &b["potential"]));
+    }
+}
+
+#[test]
 fn eval_says_what_is_wrong() {
     let folder = folder("eval_errors");
     let eval = |model: &str, text: &str, texts: &[&str]| {

@@ -7,30 +7,41 @@ use crate::plan::Plan;
 use crate::symbolic::machine::{latency, SINE, WIDTH};
 use crate::symbolic::{Cost, Operand, ProgramResult, BYTES};
 
-/// Cost of a group in loop form; `None` where it has none. Turns follow each other as fast as what they carry allows.
-/// Sines and cosines are left out, as everywhere.
+/// Cost of a group in loop form; `None` where it has none. Sines and cosines are left out, as everywhere.
 pub fn cost(plan: &Plan, group: Output, options: &Options) -> Option<Cost> {
-    rolled(plan, group, options).map(|rolled| of_program(&rolled.program))
+    rolled(plan, group, options).map(|rolled| rolled.program.cost())
 }
 
-fn of_program(program: &RolledProgram) -> Cost {
-    let mut sum = Cost { operations: program.counts().total(), critical_path: SINE, ..Cost::default() };
-    for block in &program.blocks {
-        let instructions = block.program.instructions();
-        sum.bytes += BYTES * instructions as f64;
-        let (turns, path) = match &block.repeat {
-            None => (1, block.program.critical_path()),
-            Some(repeat) if repeat.way.is_none() => continue,
-            Some(repeat) => (program.loops[repeat.run].table.len(), carried_path(block)),
-        };
-        // Rows are written; what is read is an operand of instructions.
-        let rows = block.outputs.iter().filter(|t| matches!(t, Target::Row(_))).count();
-        let throughput = block.program.throughput().max((instructions + rows) as f64 / f64::from(WIDTH));
-        sum.instructions += turns * (instructions + rows);
-        sum.throughput += turns as f64 * throughput;
-        sum.critical_path += turns as u32 * path;
+impl RolledProgram {
+    /// Its cost. Turns follow each other as fast as what they carry allows.
+    pub fn cost(&self) -> Cost {
+        let mut sum = Cost { operations: self.counts().total(), critical_path: SINE, ..Cost::default() };
+        for block in &self.blocks {
+            let instructions = block.program.instructions();
+            sum.bytes += BYTES * instructions as f64;
+            let (turns, path) = match &block.repeat {
+                None => (1, block.program.critical_path()),
+                Some(repeat) if repeat.way.is_none() => continue,
+                Some(_) => (self.turns(block), carried_path(block)),
+            };
+            // Rows are written; what is read is an operand of instructions.
+            let rows = block.outputs.iter().filter(|t| matches!(t, Target::Row(_))).count();
+            let throughput = block.program.throughput().max((instructions + rows) as f64 / f64::from(WIDTH));
+            sum.instructions += turns * (instructions + rows);
+            sum.throughput += turns as f64 * throughput;
+            sum.critical_path += turns as u32 * path;
+        }
+        sum
     }
-    sum
+
+    /// Cycles that the busiest pipe needs with sines, cosines and divisions: for one state, and for each of eight states at
+    /// once.
+    pub fn bounds(&self) -> [f64; 2] {
+        self.blocks.iter().fold([0.0; 2], |[one, lane], block| {
+            let turns = self.turns(block) as f64;
+            [one + turns * block.program.bound(), lane + turns * block.program.bound_of_lanes()]
+        })
+    }
 }
 
 /// Cycles from what a turn takes from the one before it to what it hands on.

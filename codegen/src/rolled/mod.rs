@@ -25,7 +25,7 @@ use std::collections::BTreeSet;
 use crate::options::{Options, RolledCode};
 use crate::output::{Output, OutputProgram};
 use crate::plan::{Plan, RowsThatAct};
-use crate::symbolic::{Counts, Program, ProgramResult};
+use crate::symbolic::{Counts, Label, Program, ProgramResult};
 
 pub use cost::cost;
 pub use mbd_runtime::sweep::pass::SweepDirection;
@@ -163,18 +163,26 @@ pub struct RolledProgram {
 impl RolledProgram {
     /// Operations that are executed.
     pub fn counts(&self) -> Counts {
+        self.counts_where(|_| true)
+    }
+
+    /// Operations that are executed and whose label meets a condition.
+    pub fn counts_where(&self, condition: impl Fn(&Label) -> bool) -> Counts {
         self.blocks.iter().fold(Counts::default(), |sum, block| {
-            let turns = block.repeat.as_ref().map_or(1, |r| self.loops[r.run].table.len());
-            let once = block.program.counts();
-            (0..turns).fold(sum, |sum, _| sum.plus(once))
+            sum.plus(block.program.counts_where(&condition).times(self.turns(block)))
         })
+    }
+
+    /// How many times a block is executed.
+    fn turns(&self, block: &Block) -> usize {
+        block.repeat.as_ref().map_or(1, |r| self.loops[r.run].table.len())
     }
 
     /// Numbers of the inputs that are read.
     pub fn used_inputs(&self) -> BTreeSet<usize> {
         let mut used = BTreeSet::new();
         for block in &self.blocks {
-            let turns = block.repeat.as_ref().map_or(1, |r| self.loops[r.run].table.len());
+            let turns = self.turns(block);
             for place in &block.inputs {
                 match *place {
                     Place::Given(k) => used.extend([k]),

@@ -47,6 +47,17 @@ impl Counts {
         }
     }
 
+    /// Those of a program that is executed `n` times.
+    pub fn times(self, n: usize) -> Counts {
+        Counts {
+            additions: n * self.additions,
+            multiplications: n * self.multiplications,
+            divisions: n * self.divisions,
+            roots: n * self.roots,
+            sincos: n * self.sincos,
+        }
+    }
+
     fn add(&mut self, op: &Op, sine_of_pair: bool) {
         match op {
             Op::Input(_) => {}
