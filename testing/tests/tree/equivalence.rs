@@ -1,6 +1,6 @@
 //! Two descriptions of the same mechanism give the same motion.
 
-use mbd_codegen::model::{JointMotion, Model, Rotation, Value};
+use mbd_codegen::model::{JointMotion, Model, Rotation, Value, Wrench, WrenchAxes};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::read;
 use mbd_runtime::sweep::{FrameState, Sweeps};
@@ -132,6 +132,29 @@ fn regrouped_trees_move_as_described_ones() {
         }
     }
     println!("regrouped against described: {worst:.1e}");
+}
+
+/// Plain trees have sweeps that are compiled apart ([`mbd_runtime::tree::Tree::is_plain`]). A wrench of zero makes the
+/// same tree one that is not plain, and adds zeros: everything else must be equal.
+#[test]
+fn plain_trees_move_as_others_do() {
+    let mut plain = 0;
+    for seed in 0..TREES {
+        let distribution = Distribution { mimic: 0.0, wrenches: 0.0, ..Distribution::everything(seed, 8) };
+        let model = random_model(seed, &distribution);
+        let mut pulled = model.clone();
+        pulled.wrenches.push(Wrench { name: "none".into(), body: 0, axes: WrenchAxes::Body });
+        let [one, other] = [&model, &pulled].map(|model| Plan::new(model, 0.0));
+        let s = random_state(&one, seed);
+        let still = State { wrenches: vec![[0.0; 6]], ..s.clone() };
+        assert!(!other.tree(&s.params).is_plain());
+        plain += usize::from(one.tree(&s.params).is_plain());
+        for ((what, a), (_, b)) in results(&one, &s).iter().zip(&results(&other, &still)) {
+            assert_eq!(a, b, "seed {seed}: {what}\n{}", to_toml(&model));
+        }
+    }
+    println!("{plain} plain trees");
+    assert!(plain > 200);
 }
 
 /// With `x_free = G x + offset`: `M = Gᵀ M_free G`, `p = Gᵀ p_free`, `ṗ = Gᵀ ṗ_free`. The forces that keep the mimic
