@@ -202,7 +202,6 @@ impl<S: Scalar, T: Trace> Context<'_, S, T> {
     /// outward (as [`passes`] says): all sweeps of a pass visit a node together, while its numbers are at hand.
     #[inline(always)]
     pub(super) fn run_together<const N: usize>(&mut self, list: SweepList<S, T, N>) {
-        debug_assert!(passes(&list.sweeps, self.sweeps.tree).len() <= 2, "a plain tree is visited more often");
         self.pass(&list.sweeps, SweepDirection::TipToBase);
         self.pass(&list.sweeps, SweepDirection::BaseToTip);
         (list.finish)(self);
