@@ -203,15 +203,16 @@ impl<S: Scalar> Interpreter<S> {
         sweeps.accelerations(q, v, &inputs!(self), &mut self.work, a);
     }
 
-    /// Residuals of the constraints and entries of `Φ`, `q → (φ, Φ)`: [`Constrained::constraint_residuals`], also for
-    /// scalars that cannot be compared.
+    /// Residuals of the constraints and entries of `Φ`, `q → (φ, Φ)`:
+    /// [`Constrained::constraint_residuals`](crate::system::Constrained::constraint_residuals), also for scalars that
+    /// cannot be compared.
     pub fn residuals(&mut self, q: &[S], residual: &mut [S], entries: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.constraint_residuals(q, &inputs!(self), &mut self.work, residual, entries);
     }
 
-    /// Forces and moments of the constraints, `(q, v) → λ`: [`Constrained::multipliers`], also for scalars that cannot be
-    /// compared.
+    /// Forces and moments of the constraints, `(q, v) → λ`:
+    /// [`Constrained::multipliers`](crate::system::Constrained::multipliers), also for scalars that cannot be compared.
     pub fn constraint_multipliers(&mut self, q: &[S], v: &[S], lambda: &mut [S]) {
         let sweeps = Sweeps { tree: self.tree.for_accelerations(), trace: &() };
         sweeps.multipliers(q, v, &inputs!(self), &mut self.work, &mut self.v, lambda);
