@@ -114,12 +114,17 @@ def compare(name, repeats):
             for k in range(ROWS):
                 model.rollout((q[k], v[k]), u[k], dt=DT, threads=1)
 
+        def one_by_one_momenta():
+            for k in range(ROWS):
+                model.rollout((q[k], v[k]), u[k], dt=DT, threads=1, state="momenta")
+
         def theirs_one_by_one():
             for k in range(ROWS):
                 theirs.rollout(other, [data], start[k : k + 1], forces[k : k + 1])
 
         ways = {
             "one": one_by_one,
+            "one, momenta": one_by_one_momenta,
             "batch": lambda: model.rollout((q, v), u, dt=DT, threads=1),
             "batch, momenta": lambda: model.rollout((q, v), u, dt=DT, threads=1, state="momenta"),
             "MuJoCo one": theirs_one_by_one,
@@ -134,7 +139,8 @@ def compare(name, repeats):
     print(f"{name}: {model.nv} velocities; both motions differ by {apart:.1e} after {STEPS * DT:.1f} s")
     for way, steps in rate.items():
         print(f"  {way:16} {steps:9.1f} thousand steps a second of one thread")
-    for way, best_of in (("one", ("MuJoCo one",)), *((way, ("MuJoCo rollout", "MuJoCo Batch")) for way in ("batch", "batch, momenta"))):
+    alone, together = ("MuJoCo one",), ("MuJoCo rollout", "MuJoCo Batch")
+    for way, best_of in (("one", alone), ("one, momenta", alone), ("batch", together), ("batch, momenta", together)):
         print(f"  {way}: {rate[way] / max(rate[other] for other in best_of):.1f} times {' or '.join(best_of)}, the better one")
     refine(model, other, q, u)
 
