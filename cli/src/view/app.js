@@ -261,11 +261,24 @@ function ended(text) {
   trouble("The motion cannot go on", `${text}\nRestart it, change its start, or take shorter steps.`);
 }
 
+/** Draws coarser while a motion is shown by fewer than thirty pictures a second, and sharp again when it stands still. */
+function pace(passed) {
+  if (!page.playing) {
+    if (canvas.fineness < 1) page.changed = true;
+    [canvas.fineness, page.pace] = [1, 0];
+    return;
+  }
+  page.pace += 0.1 * (passed - page.pace);
+  if (page.pace < 1 / 30 || canvas.fineness <= 0.4) return;
+  [canvas.fineness, page.pace] = [Math.max(0.4, 0.75 * canvas.fineness), 0];
+}
+
 /** A frame of the page. */
 function tick(now) {
   requestAnimationFrame(tick);
   const passed = Math.min(0.1, (now - page.last) / 1000 || 0);
   page.last = now;
+  pace(passed);
   if (page.playing && page.scene) {
     page.debt = Math.min(page.debt + passed * page.speed, 0.2 * page.speed);
     const count = Math.floor(page.debt / page.settings.step);
@@ -323,7 +336,7 @@ function draw() {
   scrub.setAttribute("aria-valuetext", `${instant.t.toFixed(3)} seconds`);
   if (page.drawn++ % 3 === 0 || !page.playing) panelDraw(ink);
 }
-page.drawn = 0;
+[page.drawn, page.pace] = [0, 0];
 
 /** Names, axes and gravity, in two dimensions over the picture. */
 function overlay(ink) {

@@ -35,6 +35,8 @@ class Canvas {
     const gl = element.getContext("webgl2", { antialias: true, stencil: true, preserveDrawingBuffer: true });
     if (!gl) throw new Error("this browser draws no WebGL2: enable hardware acceleration, or take another browser");
     this.gl = gl;
+    /** Share of the screen's pixels along an edge that a picture has: less than 1 where the machine draws slowly. */
+    this.fineness = 1;
     this.view = { yaw: -1.1, pitch: 0.38, distance: 4, at: [0, 0, 0] };
     this.prepare();
     element.addEventListener("webglcontextlost", (event) => event.preventDefault());
@@ -80,7 +82,7 @@ class Canvas {
 
   /** Sets eye and projection for the size that the canvas has. */
   camera() {
-    const { element, view } = this, ratio = Math.min(devicePixelRatio || 1, 2);
+    const { element, view } = this, ratio = this.fineness * Math.min(devicePixelRatio || 1, 2);
     const [w, h] = [Math.max(1, Math.round(element.clientWidth * ratio)), Math.max(1, Math.round(element.clientHeight * ratio))];
     if (element.width !== w || element.height !== h) [element.width, element.height] = [w, h];
     this.gl.viewport(0, 0, w, h);
