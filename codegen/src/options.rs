@@ -60,6 +60,18 @@ choice! {
 }
 
 choice! {
+    /// How rows of the constraints are eliminated that become nearly dependent on one another during a motion.
+    pub enum RowElimination {
+        /// In one pass, in the order that is best at the start and near it.
+        Once = "once",
+        /// In two passes where three rows or more are solved at one node: rows of which less than a tenth is left
+        /// wait for the second pass. Their order does not matter then, wherever the mechanism goes, and every
+        /// evaluation has more operations. Rows of contacts are eliminated once.
+        Twice = "twice",
+    }
+}
+
+choice! {
     /// Strategy by which the elimination of the joints is chosen.
     pub enum EliminationStrategy {
         /// Branch by branch the elimination for which the rates take the least time for one state, by the cost model,
@@ -93,6 +105,8 @@ pub struct PlanOptions {
     pub rolled: RolledCode,
     /// Where like branches are computed together.
     pub branches: LikeBranches,
+    /// Elimination of the rows of constraints.
+    pub rows: RowElimination,
 }
 
 impl Default for PlanOptions {
@@ -104,6 +118,7 @@ impl Default for PlanOptions {
             mass_matrix: true,
             rolled: RolledCode::default(),
             branches: LikeBranches::default(),
+            rows: RowElimination::default(),
         }
     }
 }

@@ -359,6 +359,10 @@ pub struct Constraint<S> {
     pub bond: Bond<S>,
     /// Its place among [`Tree::unknowns`], one for each row.
     pub slots: Vec<usize>,
+    /// Second places of its rows, as many as `slots`, where rows are eliminated in two passes; none elsewhere. The first
+    /// pass leaves out rows of which little is left, and the second eliminates those: so the order of the rows need not
+    /// be known in advance ([`row_order`]).
+    pub second: Vec<usize>,
     /// Its first row among all.
     pub first: usize,
     /// The first entry of its rows among all entries of `Φ`.
@@ -458,7 +462,7 @@ impl<S> Tree<S> {
 
     /// Whether number `g` of [`Tree::unknowns`] is a row of one of the constraints.
     pub fn is_slot(&self, g: usize) -> bool {
-        self.constraints.iter().any(|c| c.slots.contains(&g))
+        self.constraints.iter().any(|c| c.slots.contains(&g) || c.second.contains(&g))
     }
 }
 

@@ -2,7 +2,7 @@
 //! no time to find.
 
 use mbd_codegen::model::Model;
-use mbd_codegen::options::{EliminationStrategy, LikeBranches, PlanOptions, RolledCode, DEFAULT_SNAP};
+use mbd_codegen::options::{EliminationStrategy, LikeBranches, PlanOptions, RolledCode, RowElimination, DEFAULT_SNAP};
 use mbd_codegen::plan::{chains, has_rows, parallel_runs, ChainElimination, Plan};
 use mbd_codegen::search;
 
@@ -20,6 +20,7 @@ pub fn random_plan_snapped(model: &Model, snap: f64, seed: u64) -> Plan {
         elimination: EliminationStrategy::Single,
         rolled: RolledCode::Never,
         branches: LikeBranches::default(),
+        rows: RowElimination::default(),
         accelerations: false,
         mass_matrix: false,
     };

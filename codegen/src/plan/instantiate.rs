@@ -212,8 +212,8 @@ impl PlanConstraint {
             },
         };
         let decay = (self.decay != Value::ZERO).then(|| value(self.decay, params));
-        let (slots, velocities) = (self.slots.clone(), self.velocities.clone());
+        let (slots, second, velocities) = (self.slots.clone(), self.second.clone(), self.velocities.clone());
         let (first, entry) = (self.first, self.entry);
-        Constraint { bond, slots, first, entry, velocities, decay, compliance: None }
+        Constraint { bond, slots, second, first, entry, velocities, decay, compliance: None }
     }
 }

@@ -96,6 +96,7 @@ impl<S: Scalar> Constraint<S> {
         Constraint {
             bond,
             slots: self.slots.clone(),
+            second: self.second.clone(),
             first: self.first,
             entry: self.entry,
             velocities: self.velocities.clone(),
