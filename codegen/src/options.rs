@@ -60,14 +60,14 @@ choice! {
 }
 
 choice! {
-    /// How rows of the constraints are eliminated that become nearly dependent on one another during a motion.
+    /// How rows of the constraints are eliminated, which may become nearly dependent on one another during a motion.
     pub enum RowElimination {
-        /// In one pass, in the order that is best at the start and near it.
+        /// One after the other, in the order that is best at the start and near it.
         Once = "once",
-        /// In two passes where three rows or more are solved at one node: rows of which less than a tenth is left
-        /// wait for the second pass. Their order does not matter then, wherever the mechanism goes, and every
+        /// In five passes where three rows or more are solved at one node: each takes the rows of which enough is left,
+        /// and less in every pass. So the order of the rows does not matter wherever the mechanism goes, and every
         /// evaluation has more operations. Rows of contacts are eliminated once.
-        Twice = "twice",
+        Passes = "passes",
     }
 }
 

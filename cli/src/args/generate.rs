@@ -31,7 +31,7 @@ pub struct CodeArgs {
     /// Where like branches (legs, arms) are computed at the same time for one state
     #[arg(long, value_parser = choice!(LikeBranches), default_value = LikeBranches::default().name())]
     pub branches: LikeBranches,
-    /// Rows of loops and couplings: eliminated in one pass in the order that is best at the start, or in two, so that
+    /// Rows of loops and couplings: eliminated once in the order that is best at the start, or in passes, so that
     /// their order does not matter wherever they become nearly dependent
     #[arg(long, value_parser = choice!(RowElimination), default_value = RowElimination::default().name())]
     pub rows: RowElimination,

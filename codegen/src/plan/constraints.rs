@@ -104,8 +104,8 @@ pub fn constrain(plan: &mut Plan, constraints: &[Constraint], frames: &[Option<[
         open(plan, &slots, &bond, &members);
         let velocities = velocities(plan, &bond.cycle());
         let decay = constraint.decay;
-        let (name, second) = (constraint.name, Vec::new());
-        plan.constraints.push(PlanConstraint { name, bond, slots, second, first, entry, velocities, decay });
+        let (name, passes) = (constraint.name, Vec::new());
+        plan.constraints.push(PlanConstraint { name, bond, slots, passes, first, entry, velocities, decay });
     }
 }
 
@@ -141,7 +141,7 @@ impl Plan {
         let silent: Vec<usize> = self
             .constraints
             .iter()
-            .flat_map(|c| [&c.slots, &c.second].map(|slots| (c.first, slots)))
+            .flat_map(|c| c.passes.iter().chain([&c.slots]).map(|slots| (c.first, slots)))
             .flat_map(|(first, slots)| slots.iter().enumerate().filter(move |(k, _)| !acts[first + k]).map(|(_, g)| *g))
             .collect();
         self.close_columns(&silent);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use mbd_runtime::integrate::Chart;
 use mbd_runtime::tree::row_order::{order_rows, reorder_rows, row_of, RowLists, RowProducts, FEWEST};
-use mbd_runtime::tree::{Elimination, Unknown};
+use mbd_runtime::tree::{Elimination, Unknown, PASSES};
 use mbd_runtime::Interpreter;
 
 use super::structure::{Plan, RowsThatAct};
@@ -47,8 +47,8 @@ pub(super) fn order(plan: &mut Plan) {
 impl Plan {
     /// [`mbd_runtime::tree::Tree::reorder_rows`]; a plan of whose rows some act keeps its order.
     pub fn reorder_rows(&mut self, at: &RowProducts) -> bool {
-        let twice = self.constraints.iter().any(|c| !c.second.is_empty());
-        if twice || !matches!(self.acts, RowsThatAct::All) {
+        let passes = self.constraints.iter().any(|c| !c.passes.is_empty());
+        if passes || !matches!(self.acts, RowsThatAct::All) {
             return false;
         }
         let own = reorder_rows(self, at);
@@ -58,12 +58,12 @@ impl Plan {
 }
 
 impl Plan {
-    /// Gives the constraints a second place among the unknowns for each of their rows, behind the first places of all rows
-    /// that are solved at the same node, where those are [`FEWEST`] or more: the elimination in two passes, which does not
+    /// Gives the rows that are solved at the same node, where they are [`FEWEST`] or more, a place among the unknowns for
+    /// each of the [passes](PASSES): those of one pass after those of the pass before it. Such an elimination does not
     /// depend on the order of the rows. Plans with rolled code stay as they are.
-    pub(crate) fn eliminate_rows_twice(&mut self) {
+    pub(crate) fn eliminate_rows_in_passes(&mut self) {
         if let Some(other) = &mut self.accelerations {
-            other.eliminate_rows_twice();
+            other.eliminate_rows_in_passes();
         }
         if self.nodes.iter().any(|node| node.rolled) {
             return;
@@ -76,16 +76,23 @@ impl Plan {
             let enough = rows.clone().count() >= FEWEST;
             if enough { &mut together } else { &mut alone }.extend(rows);
         }
-        let mut second = BTreeMap::new();
+        let mut earlier = vec![BTreeMap::new(); PASSES.len()];
         for constraint in &mut self.constraints {
             let slots = &constraint.slots;
             if slots.iter().any(|g| together.contains(g)) && !slots.iter().any(|g| alone.contains(g)) {
-                constraint.second = (0..slots.len()).map(|k| self.unknowns.len() + k).collect();
-                second.extend(slots.iter().copied().zip(constraint.second.iter().copied()));
-                self.unknowns.extend((constraint.first..constraint.first + slots.len()).map(Unknown::Row));
+                for places in &mut earlier {
+                    let own: Vec<usize> = (0..slots.len()).map(|k| self.unknowns.len() + k).collect();
+                    places.extend(slots.iter().copied().zip(own.iter().copied()));
+                    constraint.passes.push(own);
+                    self.unknowns.extend((constraint.first..constraint.first + slots.len()).map(Unknown::Row));
+                }
             }
         }
-        let extend = |list: &mut Vec<usize>| list.extend(list.clone().iter().filter_map(|g| second.get(g)));
+        // Rows take their last places after those of the passes before.
+        let extend = |list: &mut Vec<usize>| {
+            let passes = earlier.iter().flat_map(|places| list.iter().filter_map(|g| places.get(g)));
+            *list = passes.copied().chain(list.iter().copied()).collect();
+        };
         for node in &mut self.nodes {
             let Elimination { open, ends, solve_before, solve_after, .. } = &mut node.elimination;
             [open, ends, solve_before, solve_after].into_iter().for_each(extend);

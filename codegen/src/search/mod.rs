@@ -53,8 +53,8 @@ pub fn best(mut plan: Plan, options: PlanOptions) -> Chosen {
             mass_matrix::choose(&mut plan);
         }
     }
-    if options.rows == RowElimination::Twice {
-        plan.eliminate_rows_twice();
+    if options.rows == RowElimination::Passes {
+        plan.eliminate_rows_in_passes();
     }
     Chosen { plan, candidates }
 }

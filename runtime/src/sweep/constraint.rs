@@ -10,13 +10,10 @@ use super::pass::{each_node, visit_force, Sweep, SweepDirection};
 use super::{Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Mat3, Motion, Vec3};
 use crate::system::Row;
-use crate::tree::{Bond, Constraint, Cut, Source, Tree, TreeFrame, Unknown};
+use crate::tree::{Bond, Constraint, Cut, Source, Tree, TreeFrame, Unknown, PASSES};
 use crate::workspace::{Factor, Poses, Relative, Workspace};
 use crate::Scalar;
 use alloc::vec::Vec;
-
-/// The first of two passes leaves a row out of which less than this part is left.
-const FIRST_PASS: f64 = 0.1;
 
 impl<S: Scalar> Constraint<S> {
     /// Whether its rows are constants at the one node that they act on.
@@ -56,9 +53,9 @@ impl<S: Scalar> Constraint<S> {
         matches!(self.bond, Bond::Cut(_))
     }
 
-    /// Its rows with their places among the unknowns; every row twice where rows are eliminated in two passes.
+    /// Its rows with their places among the unknowns: those of every pass where rows are eliminated in passes.
     fn places(&self) -> impl Iterator<Item = (usize, &usize)> {
-        self.range().zip(&self.slots).chain(self.range().zip(&self.second))
+        self.passes.iter().chain([&self.slots]).flat_map(|slots| self.range().zip(slots))
     }
 
     /// Its rows.
@@ -255,7 +252,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// its unit: it follows from rows before it, or its bodies cannot move along it. Its own diagonal alone is no
     /// measure: where bars come to lie in one line, a row may vanish together with it. Where the bodies can move along
     /// none of the rows, all diagonals are rounding errors; the `1` compares them with what a body of 1 kg or 1 kg m²
-    /// would give. The first of two passes leaves more rows out, which wait for the second.
+    /// would give. All passes but the last leave more rows out, which wait for the next ones.
     pub(super) fn row_pivot(&self, g: usize, r: usize, f: &Factor<S>) -> S {
         let ng = self.tree.unknowns.len();
         let tolerance = self.tree.tolerance;
@@ -270,8 +267,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             }
         }
         let mut floor = tolerance * (alike + tolerance * (all + S::one()));
-        if constraint.slots.iter().zip(&constraint.second).any(|(first, _)| *first == g) {
-            floor = floor + S::constant(FIRST_PASS) * f.whole[g];
+        if let Some((part, _)) = PASSES.iter().zip(&constraint.passes).find(|(_, slots)| slots.contains(&g)) {
+            floor = floor + S::constant(*part) * f.whole[g];
         }
         self.if_acts(r, -(-f.gram[g * ng + g]).reciprocal_above(floor))
     }
@@ -292,10 +289,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub(super) fn collect_multipliers(&self, solved: &[S], out: &mut [S]) {
         for constraint in &self.tree.constraints {
             for (r, &g) in constraint.range().zip(&constraint.slots) {
-                out[r] = solved[g];
-            }
-            for (r, &g) in constraint.range().zip(&constraint.second) {
-                out[r] = out[r] + solved[g];
+                // A row has a multiplier in one of its passes at most.
+                let others = constraint.passes.iter().map(|slots| solved[slots[r - constraint.first]]);
+                out[r] = others.fold(solved[g], |sum, x| sum + x);
             }
         }
     }
@@ -499,7 +495,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let ng = self.tree.unknowns.len();
         pivots.fill(S::zero());
         for (r, &g) in self.tree.constraints.iter().flat_map(Constraint::places) {
-            // The product x · (ρ x) is zero where the row was left out, in one of two passes at least.
+            // The product x · (ρ x) is zero where the row was left out, in all passes but one at least.
             let x = w.factor.gram[g * ng + g];
             pivots[r] = pivots[r] + x * (w.factor.unknown_pivots[g].rho * -x);
         }

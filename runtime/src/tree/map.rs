@@ -96,7 +96,7 @@ impl<S: Scalar> Constraint<S> {
         Constraint {
             bond,
             slots: self.slots.clone(),
-            second: self.second.clone(),
+            passes: self.passes.clone(),
             first: self.first,
             entry: self.entry,
             velocities: self.velocities.clone(),

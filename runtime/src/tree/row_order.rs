@@ -111,7 +111,7 @@ pub fn reorder_rows(lists: &mut impl RowLists, at: &RowProducts) -> bool {
 impl<S> Tree<S> {
     /// Whether there are rows enough for their order to matter.
     pub fn rows_can_be_ordered(&self) -> bool {
-        self.dims.rows >= FEWEST && self.constraints.iter().all(|c| c.second.is_empty())
+        self.dims.rows >= FEWEST && self.constraints.iter().all(|c| c.passes.is_empty())
     }
 
     /// Chooses the order of its rows anew, where the one that it has loses digits at a position. Returns whether it has

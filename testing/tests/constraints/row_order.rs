@@ -222,19 +222,19 @@ fn and_none_where_they_are_ordered_anew() {
     assert_eq!(errors, later::<Interpreter<f64>>(1e-4, true).0);
 }
 
-/// Rows that are eliminated in two passes may come in any order, and no redundant one is kept, without being ordered anew:
+/// Rows that are eliminated in passes may come in any order, and no redundant one is kept, without being ordered anew:
 /// what code that was generated ahead of time does.
 #[test]
-fn rows_in_two_passes_may_come_in_any_order() {
-    let twice = |model: &Model, listed: &[[f64; 4]], delta: f64| {
-        let options = PlanOptions { rows: RowElimination::Twice, ..PlanOptions::quick() };
+fn rows_in_passes_may_come_in_any_order() {
+    let passes = |model: &Model, listed: &[[f64; 4]], delta: f64| {
+        let options = PlanOptions { rows: RowElimination::Passes, ..PlanOptions::quick() };
         with_ratios(search::plan(model, options), listed, (U, delta))
     };
     for delta in [1e-1, 3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7] {
         let rows = rows(A, U, W, FAR);
-        let (errors, three) = errors::<Interpreter<f64>>(&rows, |model, listed| twice(model, listed, delta), false);
+        let (errors, three) = errors::<Interpreter<f64>>(&rows, |model, listed| passes(model, listed, delta), false);
         let [best, worst] = extremes(&errors);
-        println!("δ = {delta:e}, two passes: errors between {best:.1e} and {worst:.1e}");
+        println!("δ = {delta:e}, in passes: errors between {best:.1e} and {worst:.1e}");
         assert!(three && worst <= 10.0 * best, "{delta:e}: {errors:?}");
     }
 }
