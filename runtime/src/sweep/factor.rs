@@ -77,8 +77,16 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             match shared {
                 Unknown::Velocity(_) => (0..ng).for_each(|h| clear(h, &mut f.gram)),
                 Unknown::Row(r) => {
-                    f.later[g].iter().for_each(|&h| clear(h, &mut f.gram));
-                    f.gram[g * ng + g] = -self.compliance(*r);
+                    let compliance = self.compliance(*r);
+                    for &h in &f.later[g] {
+                        clear(h, &mut f.gram);
+                        // The same row in another pass.
+                        if self.tree.unknowns[h] == *shared {
+                            f.gram[g * ng + h] = -compliance;
+                            f.gram[h * ng + g] = -compliance;
+                        }
+                    }
+                    f.gram[g * ng + g] = -compliance;
                 }
             }
         }
