@@ -34,12 +34,12 @@ use kernels::{total, Integrate, Iterate, Iteration, Multiply, Product};
 /// Order of the method.
 const ORDER: u32 = 16;
 /// As [`Stepper::share`](super::Stepper::share).
-const SHARE: f64 = 1.0 / 16.0;
+const SHARE: f64 = 1.0 / 64.0;
 /// Fraction of the allowed error that may remain after the iteration.
 const PART: f64 = 0.02;
 /// The decay of eight coefficients is extrapolated to the seventeenth: single steps err by a hundred times the result,
 /// because the decay is uneven. With errors of order 17 this factor costs a few percent of the sweeps.
-const MARGIN: f64 = 30.0;
+const MARGIN: f64 = 100.0;
 /// Epsilons of the state that may remain where no tolerance is given.
 const FLOOR: f64 = 4.0;
 /// Most iterations of a step of fixed size, and of one under error control.
