@@ -82,7 +82,7 @@ pub enum Modes {
     Listed(String),
 }
 
-const KEYS: [&str; 20] = [
+const KEYS: [&str; 21] = [
     "path",
     "name",
     "variant",
