@@ -92,7 +92,7 @@ fn gauss16_keeps_its_digits_on_an_arm() {
     let system = plan.default_interpreter::<f64>();
     let q: Vec<f64> = (0..6).map(|k| if k % 2 == 0 { 0.3 } else { -0.3 }).collect();
     let mut p = system.zero_momenta();
-    system.clone().momenta(&q, &vec![0.5; 6], &mut p);
+    system.clone().momenta(&q, &[0.5; 6], &mut p);
     let end = |method: &str, tolerance: f64| {
         let mut system = system.clone();
         let method = catalogue::any(method, &system, false).expect("the catalogue has the method");
