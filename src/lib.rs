@@ -65,6 +65,7 @@ pub use mbd_runtime as runtime;
 /// | `elimination = fewest` | how joints are eliminated: `fastest` by the cost model, with the `fewest` operations, or each joint by itself, `single` | `fastest` |
 /// | `rolled = never` | loops over like links: where they gain (`auto`), wherever links repeat (`always`), or `never` | `auto` |
 /// | `branches = apart` | like branches (legs, arms) at the same time for one state: where that is faster (`auto`), wherever there are any (`together`), or nowhere (`apart`) | `auto` |
+/// | `rows = passes` | rows of loops and couplings are eliminated in passes, so that their order does not matter wherever they become nearly dependent | `once` |
 /// | `variant = "docked"` | a `[[variant]]` of the description in place of the model itself | |
 /// | `from = Arm` | types of the same description from which states are carried over ([`TransferFrom`](runtime::TransferFrom)); a list names variants: `[Arm, "held": Held]` | none |
 /// | `base = floating` | how the root of a URDF is attached to the ground: `fixed`, `floating` or `planar` | `fixed` |

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use multibody::codegen::options::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
+use multibody::codegen::options::{EliminationStrategy, PlanOptions, RowElimination, DEFAULT_SNAP};
 use multibody::codegen::read::{Base, ImportOptions};
 use multibody::codegen::{self, Arithmetic, LikeBranches, Options, Output, Precision, RolledCode};
 use serde::Deserialize;
@@ -43,6 +43,7 @@ struct Entry {
     #[serde(alias = "loops")]
     rolled: Option<String>,
     branches: Option<String>,
+    rows: Option<String>,
     efforts: Option<bool>,
     frames: Option<Vec<String>>,
     snap: Option<f64>,
@@ -96,7 +97,7 @@ fn read(path: &Path) -> Outcome<Manifest> {
 }
 
 const KEYS: &str = "a manifest has `runtime` and [[file]] tables with `file`, `model`, `type`, `outputs`, and perhaps \
-                    `base`, `gravity`, `scalar`, `arithmetic`, `elimination`, `rolled`, `branches`, `efforts`, `frames`, `snap`, `chunk`, `modes`";
+                    `base`, `gravity`, `scalar`, `arithmetic`, `elimination`, `rolled`, `branches`, `rows`, `efforts`, `frames`, `snap`, `chunk`, `modes`";
 
 /// The text that a file should have.
 fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> Outcome<String> {
@@ -124,6 +125,7 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
             elimination: choice("elimination", &entry.elimination, EliminationStrategy::from_name).map_err(wrong)?,
             rolled: choice("rolled", &entry.rolled, RolledCode::from_name).map_err(wrong)?,
             branches: choice("branches", &entry.branches, LikeBranches::from_name).map_err(wrong)?,
+            rows: choice("rows", &entry.rows, RowElimination::from_name).map_err(wrong)?,
             ..PlanOptions::default()
         },
         runtime: runtime.to_string(),

@@ -60,6 +60,18 @@ choice! {
 }
 
 choice! {
+    /// How rows of the constraints are eliminated, which may become nearly dependent on one another during a motion.
+    pub enum RowElimination {
+        /// One after the other, in the order that is best at the start and near it.
+        Once = "once",
+        /// In five passes where three rows or more are solved at one node: each takes the rows of which enough is left,
+        /// and less in every pass. So the order of the rows does not matter wherever the mechanism goes, and every
+        /// evaluation has more operations. Rows of contacts are eliminated once.
+        Passes = "passes",
+    }
+}
+
+choice! {
     /// Strategy by which the elimination of the joints is chosen.
     pub enum EliminationStrategy {
         /// Branch by branch the elimination for which the rates take the least time for one state, by the cost model,
@@ -93,6 +105,8 @@ pub struct PlanOptions {
     pub rolled: RolledCode,
     /// Where like branches are computed together.
     pub branches: LikeBranches,
+    /// Elimination of the rows of constraints.
+    pub rows: RowElimination,
 }
 
 impl Default for PlanOptions {
@@ -104,6 +118,7 @@ impl Default for PlanOptions {
             mass_matrix: true,
             rolled: RolledCode::default(),
             branches: LikeBranches::default(),
+            rows: RowElimination::default(),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Arguments of the macro: `key = value` pairs, each parsed separately, so that all errors are reported at once.
 
-use mbd_codegen::options::EliminationStrategy;
+use mbd_codegen::options::{EliminationStrategy, RowElimination};
 use mbd_codegen::read::Base;
 use mbd_codegen::words::{did_you_mean, list, quote};
 use mbd_codegen::{Arithmetic, LikeBranches, Options, Output, Precision, RolledCode};
@@ -82,7 +82,7 @@ pub enum Modes {
     Listed(String),
 }
 
-const KEYS: [&str; 20] = [
+const KEYS: [&str; 21] = [
     "path",
     "name",
     "variant",
@@ -93,6 +93,7 @@ const KEYS: [&str; 20] = [
     "elimination",
     "rolled",
     "branches",
+    "rows",
     "base",
     "gravity",
     "efforts",
@@ -205,6 +206,9 @@ impl Args {
             }
             "branches" => {
                 self.options.plan.branches = choice(&word, value, &LikeBranches::ALL.map(|b| (b.name(), b)))?;
+            }
+            "rows" => {
+                self.options.plan.rows = choice(&word, value, &RowElimination::ALL.map(|r| (r.name(), r)))?;
             }
             "base" => {
                 self.base = Some((choice("base", value, &Base::ALL.map(|b| (b.name(), b)))?, place(value)));

@@ -352,6 +352,11 @@ pub enum Bond<S> {
     },
 }
 
+/// Parts of its diagonal entry that a row must have left in the passes of an elimination in passes. After them comes a
+/// last pass with the [tolerance](Tree::tolerance) of all eliminations. So a row is eliminated before another one only
+/// if it has a thirtieth of what the other has, at least.
+pub const PASSES: [f64; 4] = [1e-1, 3e-3, 1e-4, 3e-6];
+
 /// Rows of `Φ v = b` that belong together.
 #[derive(Clone, Debug)]
 pub struct Constraint<S> {
@@ -359,6 +364,10 @@ pub struct Constraint<S> {
     pub bond: Bond<S>,
     /// Its place among [`Tree::unknowns`], one for each row.
     pub slots: Vec<usize>,
+    /// Further places of its rows, as many as `slots` for each of the [passes](PASSES) before the last, where rows are
+    /// eliminated in passes; none elsewhere. A pass leaves out rows of which too little is left, and the next ones take
+    /// them: so the order of the rows need not be known in advance ([`row_order`]).
+    pub passes: Vec<Vec<usize>>,
     /// Its first row among all.
     pub first: usize,
     /// The first entry of its rows among all entries of `Φ`.
@@ -458,7 +467,7 @@ impl<S> Tree<S> {
 
     /// Whether number `g` of [`Tree::unknowns`] is a row of one of the constraints.
     pub fn is_slot(&self, g: usize) -> bool {
-        self.constraints.iter().any(|c| c.slots.contains(&g))
+        self.constraints.iter().any(|c| c.slots.contains(&g) || c.passes.iter().flatten().any(|h| *h == g))
     }
 }
 

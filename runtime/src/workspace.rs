@@ -144,6 +144,8 @@ pub struct Factor<S> {
     /// Diagonal of `Φ M⁻¹Φᵀ` of every multiplier, before other multipliers are taken out of it; with the nodes of one
     /// constraint's cycle as far as they are done.
     pub whole: Vec<S>,
+    /// Whether rows are eliminated in passes.
+    pub in_passes: bool,
     /// For every row of a constraint, those that are open when it is eliminated and meet it: all others are
     /// independent.
     pub later: Vec<Vec<usize>>,
@@ -313,6 +315,7 @@ impl<S: Scalar> Workspace<S> {
                 cross: vec![o; f * g],
                 unknown_cross: vec![o; g * g],
                 whole: vec![o; g],
+                in_passes: tree.constraints.iter().any(|c| !c.passes.is_empty()),
                 later: later(tree),
             },
             constraints: Constraints {

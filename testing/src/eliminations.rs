@@ -2,13 +2,13 @@
 //! no time to find.
 
 use mbd_codegen::model::Model;
-use mbd_codegen::options::{EliminationStrategy, LikeBranches, PlanOptions, RolledCode, DEFAULT_SNAP};
+use mbd_codegen::options::{EliminationStrategy, LikeBranches, PlanOptions, RolledCode, RowElimination, DEFAULT_SNAP};
 use mbd_codegen::plan::{chains, has_rows, parallel_runs, ChainElimination, Plan};
 use mbd_codegen::search;
 
 use crate::random::Rng;
 
-/// A plan whose freedoms are eliminated one by one or together, at random.
+/// A plan whose freedoms are eliminated one by one or together, at random; every fourth with its rows in passes.
 pub fn random_plan(model: &Model, seed: u64) -> Plan {
     random_plan_snapped(model, DEFAULT_SNAP, seed)
 }
@@ -20,6 +20,7 @@ pub fn random_plan_snapped(model: &Model, snap: f64, seed: u64) -> Plan {
         elimination: EliminationStrategy::Single,
         rolled: RolledCode::Never,
         branches: LikeBranches::default(),
+        rows: if seed % 4 == 3 { RowElimination::Passes } else { RowElimination::Once },
         accelerations: false,
         mass_matrix: false,
     };

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use multibody::codegen::options::{EliminationStrategy, PlanOptions, DEFAULT_SNAP};
+use multibody::codegen::options::{EliminationStrategy, PlanOptions, RowElimination, DEFAULT_SNAP};
 use multibody::codegen::output;
 use multibody::codegen::{camel_case, Arithmetic, LikeBranches, Options, Output, Precision, RolledCode};
 
@@ -31,6 +31,10 @@ pub struct CodeArgs {
     /// Where like branches (legs, arms) are computed at the same time for one state
     #[arg(long, value_parser = choice!(LikeBranches), default_value = LikeBranches::default().name())]
     pub branches: LikeBranches,
+    /// Rows of loops and couplings: eliminated once in the order that is best at the start, or in passes, so that
+    /// their order does not matter wherever they become nearly dependent
+    #[arg(long, value_parser = choice!(RowElimination), default_value = RowElimination::default().name())]
+    pub rows: RowElimination,
     /// Without joint forces, which are then zero and cost nothing
     #[arg(long)]
     pub no_efforts: bool,
@@ -82,6 +86,7 @@ impl CodeArgs {
                 elimination: self.elimination,
                 rolled: self.rolled,
                 branches: self.branches,
+                rows: self.rows,
                 ..PlanOptions::default()
             },
             chunk: self.chunk as usize,

@@ -104,7 +104,8 @@ pub fn constrain(plan: &mut Plan, constraints: &[Constraint], frames: &[Option<[
         open(plan, &slots, &bond, &members);
         let velocities = velocities(plan, &bond.cycle());
         let decay = constraint.decay;
-        plan.constraints.push(PlanConstraint { name: constraint.name, bond, slots, first, entry, velocities, decay });
+        let (name, passes) = (constraint.name, Vec::new());
+        plan.constraints.push(PlanConstraint { name, bond, slots, passes, first, entry, velocities, decay });
     }
 }
 
@@ -140,7 +141,8 @@ impl Plan {
         let silent: Vec<usize> = self
             .constraints
             .iter()
-            .flat_map(|c| c.slots.iter().enumerate().filter(|(k, _)| !acts[c.first + k]).map(|(_, g)| *g))
+            .flat_map(|c| c.passes.iter().chain([&c.slots]).map(|slots| (c.first, slots)))
+            .flat_map(|(first, slots)| slots.iter().enumerate().filter(move |(k, _)| !acts[first + k]).map(|(_, g)| *g))
             .collect();
         self.close_columns(&silent);
         self.constraints.retain(|c| acts[c.first..c.first + c.slots.len()].contains(&true));

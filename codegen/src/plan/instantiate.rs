@@ -212,8 +212,8 @@ impl PlanConstraint {
             },
         };
         let decay = (self.decay != Value::ZERO).then(|| value(self.decay, params));
-        let (slots, velocities) = (self.slots.clone(), self.velocities.clone());
+        let (slots, passes, velocities) = (self.slots.clone(), self.passes.clone(), self.velocities.clone());
         let (first, entry) = (self.first, self.entry);
-        Constraint { bond, slots, first, entry, velocities, decay, compliance: None }
+        Constraint { bond, slots, passes, first, entry, velocities, decay, compliance: None }
     }
 }

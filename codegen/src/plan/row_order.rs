@@ -1,9 +1,11 @@
 //! The order in which the rows of the constraints are eliminated ([`mbd_runtime::tree::row_order`]): it is chosen at the
 //! start and near it when the plan is made.
 
+use std::collections::BTreeMap;
+
 use mbd_runtime::integrate::Chart;
 use mbd_runtime::tree::row_order::{order_rows, reorder_rows, row_of, RowLists, RowProducts, FEWEST};
-use mbd_runtime::tree::Elimination;
+use mbd_runtime::tree::{Elimination, Unknown, PASSES};
 use mbd_runtime::Interpreter;
 
 use super::structure::{Plan, RowsThatAct};
@@ -45,12 +47,57 @@ pub(super) fn order(plan: &mut Plan) {
 impl Plan {
     /// [`mbd_runtime::tree::Tree::reorder_rows`]; a plan of whose rows some act keeps its order.
     pub fn reorder_rows(&mut self, at: &RowProducts) -> bool {
-        if !matches!(self.acts, RowsThatAct::All) {
+        let passes = self.constraints.iter().any(|c| !c.passes.is_empty());
+        if passes || !matches!(self.acts, RowsThatAct::All) {
             return false;
         }
         let own = reorder_rows(self, at);
         let other = self.accelerations.as_deref_mut().is_some_and(|other| other.reorder_rows(at));
         own || other
+    }
+}
+
+impl Plan {
+    /// Gives the rows that are solved at the same node, where they are [`FEWEST`] or more, a place among the unknowns for
+    /// each of the [passes](PASSES): those of one pass after those of the pass before it. Such an elimination does not
+    /// depend on the order of the rows. Plans with rolled code stay as they are.
+    pub(crate) fn eliminate_rows_in_passes(&mut self) {
+        if let Some(other) = &mut self.accelerations {
+            other.eliminate_rows_in_passes();
+        }
+        if self.nodes.iter().any(|node| node.rolled) {
+            return;
+        }
+        let (mut alone, mut together) = (Vec::new(), Vec::new());
+        let nodes = self.nodes.iter().map(|node| &node.elimination);
+        let lists = nodes.flat_map(|e| [&e.solve_before, &e.solve_after]).chain([&self.solve_at_ground]);
+        for list in lists {
+            let rows = list.iter().copied().filter(|&g| row_of(self.unknowns[g]).is_some());
+            let enough = rows.clone().count() >= FEWEST;
+            if enough { &mut together } else { &mut alone }.extend(rows);
+        }
+        let mut earlier = vec![BTreeMap::new(); PASSES.len()];
+        for constraint in &mut self.constraints {
+            let slots = &constraint.slots;
+            if slots.iter().any(|g| together.contains(g)) && !slots.iter().any(|g| alone.contains(g)) {
+                for places in &mut earlier {
+                    let own: Vec<usize> = (0..slots.len()).map(|k| self.unknowns.len() + k).collect();
+                    places.extend(slots.iter().copied().zip(own.iter().copied()));
+                    constraint.passes.push(own);
+                    self.unknowns.extend((constraint.first..constraint.first + slots.len()).map(Unknown::Row));
+                }
+            }
+        }
+        // Rows take their last places after those of the passes before.
+        let extend = |list: &mut Vec<usize>| {
+            let passes = earlier.iter().flat_map(|places| list.iter().filter_map(|g| places.get(g)));
+            *list = passes.copied().chain(list.iter().copied()).collect();
+        };
+        for node in &mut self.nodes {
+            let Elimination { open, ends, solve_before, solve_after, .. } = &mut node.elimination;
+            [open, ends, solve_before, solve_after].into_iter().for_each(extend);
+        }
+        extend(&mut self.solve_at_ground);
     }
 }
 

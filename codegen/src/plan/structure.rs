@@ -178,6 +178,8 @@ pub struct PlanConstraint {
     pub bond: PlanBond,
     /// Its place among [`Plan::unknowns`], one for each row.
     pub slots: Vec<usize>,
+    /// Further places of its rows, see [`mbd_runtime::tree::Constraint::passes`].
+    pub passes: Vec<Vec<usize>>,
     /// Its first row.
     pub first: usize,
     /// The first entry of its rows among all entries of `Φ`.

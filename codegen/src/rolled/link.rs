@@ -284,6 +284,7 @@ fn stand_in<'g>(constraint: &Constraint<Expr<'_>>, run: &Run) -> Constraint<Expr
     Constraint {
         bond: Bond::Cut(Cut { closure: Closure::Fixed, a: nowhere(), b: nowhere(), path_a, path_b }),
         slots: constraint.slots.clone(),
+        passes: Vec::new(),
         first: constraint.first,
         entry: constraint.entry,
         decay: None,

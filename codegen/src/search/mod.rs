@@ -23,7 +23,7 @@ mod rounding;
 mod wide;
 
 use crate::model::Model;
-use crate::options::{EliminationStrategy, PlanOptions};
+use crate::options::{EliminationStrategy, PlanOptions, RowElimination};
 use crate::plan::Plan;
 
 pub use chain::Candidate;
@@ -52,6 +52,9 @@ pub fn best(mut plan: Plan, options: PlanOptions) -> Chosen {
         if options.mass_matrix {
             mass_matrix::choose(&mut plan);
         }
+    }
+    if options.rows == RowElimination::Passes {
+        plan.eliminate_rows_in_passes();
     }
     Chosen { plan, candidates }
 }

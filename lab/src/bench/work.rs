@@ -43,7 +43,7 @@ impl Variant {
         let few = ["rk4", "dop853", "verner9"];
         match self {
             Variant::Hamilton => code,
-            Variant::Interpreted => !code || few.contains(&method.name),
+            Variant::Interpreted => !code || few.contains(&method.name) || ["tsit5", "adams"].contains(&method.name),
             Variant::Acceleration => code && few.contains(&method.name),
             Variant::Single => !method.implicit && method.name != "verner9",
         }

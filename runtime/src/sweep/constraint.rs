@@ -10,7 +10,7 @@ use super::pass::{each_node, visit_force, Sweep, SweepDirection};
 use super::{Quantity, Sweeps, Trace};
 use crate::spatial::{Force, Mat3, Motion, Vec3};
 use crate::system::Row;
-use crate::tree::{Bond, Constraint, Cut, Source, Tree, TreeFrame, Unknown};
+use crate::tree::{Bond, Constraint, Cut, Source, Tree, TreeFrame, Unknown, PASSES};
 use crate::workspace::{Factor, Poses, Relative, Workspace};
 use crate::Scalar;
 use alloc::vec::Vec;
@@ -51,6 +51,11 @@ impl<S: Scalar> Constraint<S> {
     /// Whether it binds two frames.
     fn is_cut(&self) -> bool {
         matches!(self.bond, Bond::Cut(_))
+    }
+
+    /// Its rows with their places among the unknowns: those of every pass where rows are eliminated in passes.
+    fn places(&self) -> impl Iterator<Item = (usize, &usize)> {
+        self.passes.iter().chain([&self.slots]).flat_map(|slots| self.range().zip(slots))
     }
 
     /// Its rows.
@@ -211,7 +216,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let n = self.tree.nodes.len();
         for constraint in &self.tree.constraints {
             let Bond::Cut(cut) = &constraint.bond else { continue };
-            for (r, &g) in constraint.range().zip(&constraint.slots) {
+            for (r, &g) in constraint.places() {
                 for (node, seed) in [(cut.a.node, rows[r].at_a), (cut.b.node, rows[r].at_b)] {
                     if let Some(i) = node {
                         f.columns[g * n + i] = f.columns[g * n + i].plus(&seed);
@@ -247,7 +252,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// its unit: it follows from rows before it, or its bodies cannot move along it. Its own diagonal alone is no
     /// measure: where bars come to lie in one line, a row may vanish together with it. Where the bodies can move along
     /// none of the rows, all diagonals are rounding errors; the `1` compares them with what a body of 1 kg or 1 kg m²
-    /// would give.
+    /// would give. All passes but the last leave more rows out, which wait for the next ones.
     pub(super) fn row_pivot(&self, g: usize, r: usize, f: &Factor<S>) -> S {
         let ng = self.tree.unknowns.len();
         let tolerance = self.tree.tolerance;
@@ -261,7 +266,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 alike = alike + whole;
             }
         }
-        let floor = tolerance * (alike + tolerance * (all + S::one()));
+        let mut floor = tolerance * (alike + tolerance * (all + S::one()));
+        if let Some((part, _)) = PASSES.iter().zip(&constraint.passes).find(|(_, slots)| slots.contains(&g)) {
+            floor = floor + S::constant(*part) * f.whole[g];
+        }
         self.if_acts(r, -(-f.gram[g * ng + g]).reciprocal_above(floor))
     }
 
@@ -279,8 +287,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Multipliers out of a solution, in [`crate::workspace::Constraints::multipliers`].
     pub(super) fn collect_multipliers(&self, solved: &[S], out: &mut [S]) {
-        for (r, &g) in self.tree.constraints.iter().flat_map(|c| c.range().zip(&c.slots)) {
-            out[r] = solved[g];
+        for constraint in &self.tree.constraints {
+            for (r, &g) in constraint.range().zip(&constraint.slots) {
+                // A row has a multiplier in one of its passes at most.
+                let others = constraint.passes.iter().map(|slots| solved[slots[r - constraint.first]]);
+                out[r] = others.fold(solved[g], |sum, x| sum + x);
+            }
         }
     }
 
@@ -481,10 +493,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Pivots of `Φ M⁻¹Φᵀ`, zero where a row was left out.
     pub(super) fn row_pivots(&self, w: &Workspace<S>, pivots: &mut [S]) {
         let ng = self.tree.unknowns.len();
-        for (r, &g) in self.tree.constraints.iter().flat_map(|c| c.range().zip(&c.slots)) {
-            // The product x · (ρ x) is zero where the row was left out.
+        pivots.fill(S::zero());
+        for (r, &g) in self.tree.constraints.iter().flat_map(Constraint::places) {
+            // The product x · (ρ x) is zero where the row was left out, in all passes but one at least.
             let x = w.factor.gram[g * ng + g];
-            pivots[r] = x * (w.factor.unknown_pivots[g].rho * -x);
+            pivots[r] = pivots[r] + x * (w.factor.unknown_pivots[g].rho * -x);
         }
     }
 }

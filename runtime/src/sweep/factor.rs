@@ -77,8 +77,16 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             match shared {
                 Unknown::Velocity(_) => (0..ng).for_each(|h| clear(h, &mut f.gram)),
                 Unknown::Row(r) => {
-                    f.later[g].iter().for_each(|&h| clear(h, &mut f.gram));
-                    f.gram[g * ng + g] = -self.compliance(*r);
+                    let compliance = self.compliance(*r);
+                    for &h in &f.later[g] {
+                        clear(h, &mut f.gram);
+                        // The same row in another pass.
+                        if self.tree.unknowns[h] == *shared {
+                            f.gram[g * ng + h] = -compliance;
+                            f.gram[h * ng + g] = -compliance;
+                        }
+                    }
+                    f.gram[g * ng + g] = -compliance;
                 }
             }
         }
@@ -211,9 +219,24 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 f.whole[h] = f.whole[h] + c * (pivot.rho * c);
             }
             for h2 in self.elimination(i).open_after(0) {
-                f.gram[h * ng + h2] = f.gram[h * ng + h2] - c * (pivot.rho * f.cross[freedom * ng + h2]);
+                let c2 = f.cross[freedom * ng + h2];
+                f.gram[h * ng + h2] = f.gram[h * ng + h2] - self.product(f, pivot.rho, (h, c), (h2, c2));
             }
         }
+    }
+
+    /// `ρ` times the entries `c` of two unknowns. Where rows are eliminated in passes, both halves of the symmetric matrix are
+    /// read: there the order of the factors is that of the rows, so that equal entries are computed once in generated code.
+    #[inline(always)]
+    fn product(&self, f: &Factor<S>, rho: S, (g, c): (usize, S), (h, c2): (usize, S)) -> S {
+        if f.in_passes {
+            if let (Unknown::Row(r), Unknown::Row(s)) = (self.tree.unknowns[g], self.tree.unknowns[h]) {
+                if r > s {
+                    return c2 * (rho * c);
+                }
+            }
+        }
+        c * (rho * c2)
     }
 
     /// Eliminates unknown `g` at node `i` (`None`: the ground), `open` being those that stay open.
@@ -252,7 +275,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 f.columns[h * n + i] = f.columns[h * n + i].minus(&k.times(c));
             }
             for h2 in open.clone() {
-                f.gram[h * ng + h2] = f.gram[h * ng + h2] - c * (rho * f.unknown_cross[g * ng + h2]);
+                let c2 = f.unknown_cross[g * ng + h2];
+                f.gram[h * ng + h2] = f.gram[h * ng + h2] - self.product(f, rho, (h, c), (h2, c2));
             }
         }
         f.unknown_pivots[g] = Pivot { u, k, rho, armature: S::zero() };

@@ -96,6 +96,7 @@ impl<S: Scalar> Constraint<S> {
         Constraint {
             bond,
             slots: self.slots.clone(),
+            passes: self.passes.clone(),
             first: self.first,
             entry: self.entry,
             velocities: self.velocities.clone(),

@@ -111,12 +111,15 @@ pub fn reorder_rows(lists: &mut impl RowLists, at: &RowProducts) -> bool {
 impl<S> Tree<S> {
     /// Whether there are rows enough for their order to matter.
     pub fn rows_can_be_ordered(&self) -> bool {
-        self.dims.rows >= FEWEST
+        self.dims.rows >= FEWEST && self.constraints.iter().all(|c| c.passes.is_empty())
     }
 
     /// Chooses the order of its rows anew, where the one that it has loses digits at a position. Returns whether it has
     /// changed.
     pub fn reorder_rows(&mut self, at: &RowProducts) -> bool {
+        if !self.rows_can_be_ordered() {
+            return false;
+        }
         let own = reorder_rows(self, at);
         let other = self.accelerations.as_deref_mut().is_some_and(|other| other.reorder_rows(at));
         own || other

@@ -9,4 +9,5 @@ mod dense_reference;
 mod penalty;
 mod reactions;
 mod row_order;
+mod row_order_motion;
 mod truth;

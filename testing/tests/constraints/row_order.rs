@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use mbd_codegen::jit::Compiled;
 use mbd_codegen::model::{Model, Value};
+use mbd_codegen::options::{PlanOptions, RowElimination};
 use mbd_codegen::plan::{Plan, PlanBond};
 use mbd_codegen::read::{self, ImportOptions};
 use mbd_codegen::search::{self, Wide};
@@ -174,8 +175,12 @@ where
 
 /// The plan of a model whose rows are some order of those with [`FAR`], with the ratios of `delta` put in afterwards.
 fn made_before(model: &Model, listed: &[[f64; 4]], delta: f64) -> Plan {
-    let (far, near) = (rows(A, U, W, FAR), rows(A, U, W, delta));
-    let mut plan = Plan::new(model, 0.0);
+    with_ratios(Plan::new(model, 0.0), listed, (U, delta))
+}
+
+/// A plan that was made for [`FAR`] and some `u` with the ratios of `delta` put in afterwards.
+fn with_ratios(mut plan: Plan, listed: &[[f64; 4]], (u, delta): ([f64; 4], f64)) -> Plan {
+    let (far, near) = (rows(A, u, W, FAR), rows(A, u, W, delta));
     for (constraint, row) in plan.constraints.iter_mut().zip(listed) {
         let row = far.iter().position(|far| far == row).map_or(*row, |k| near[k]);
         if let PlanBond::Coupling { terms, .. } = &mut constraint.bond {
@@ -215,6 +220,23 @@ fn and_none_where_they_are_ordered_anew() {
     assert!(three);
     // In exact arithmetic machine code has the bits of the interpreter.
     assert_eq!(errors, later::<Interpreter<f64>>(1e-4, true).0);
+}
+
+/// Rows that are eliminated in passes may come in any order, and no redundant one is kept, without being ordered anew:
+/// what code that was generated ahead of time does.
+#[test]
+fn rows_in_passes_may_come_in_any_order() {
+    let passes = |model: &Model, listed: &[[f64; 4]], delta: f64| {
+        let options = PlanOptions { rows: RowElimination::Passes, ..PlanOptions::quick() };
+        with_ratios(search::plan(model, options), listed, (U, delta))
+    };
+    for delta in [1e-1, 3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7] {
+        let rows = rows(A, U, W, FAR);
+        let (errors, three) = errors::<Interpreter<f64>>(&rows, |model, listed| passes(model, listed, delta), false);
+        let [best, worst] = extremes(&errors);
+        println!("δ = {delta:e}, in passes: errors between {best:.1e} and {worst:.1e}");
+        assert!(three && worst <= 10.0 * best, "{delta:e}: {errors:?}");
+    }
 }
 
 /// A row that is eliminated late, and nearly dependent on those before it, moves at the end of the first step.
