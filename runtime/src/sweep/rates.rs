@@ -124,7 +124,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         match node.kind {
             Kind::Spherical | Kind::Floating => damper,
             // The springs of a planar joint act in the parent's axes.
-            Kind::Planar if k < 2 => damper - w.poses.joint[i].get()[2].vector([pull(0), pull(1), S::zero()])[k],
+            Kind::Planar if k < 2 => damper - w.poses.steps.own(i)[2].vector([pull(0), pull(1), S::zero()])[k],
             _ => damper - pull(k),
         }
     }

@@ -273,7 +273,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let Source::State { v: at, .. } = node.source else { return };
         match self.elimination(i).unknown {
             Some(g) => v[at] = sol.unknown_rate[g],
-            None => v[at..at + node.kind.nv()].copy_from_slice(&sol.rate[first[i]..first[i + 1]]),
+            None => each_freedom!(node.kind, |k| v[at + k] = sol.rate[first[i] + k]),
         }
     }
 }
