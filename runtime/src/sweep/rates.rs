@@ -80,7 +80,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
         let m = &w.factor.m[i];
         let acting;
-        let (hat, d) = match self.has_unknowns() {
+        let (hat, d) = match self.has_unknowns() && (self.elimination(i).deferred || self.has_open(i)) {
             true => {
                 acting = self.acting(&w.first, &w.factor, &w.velocity, i);
                 (&acting.0, &acting.1)

@@ -98,11 +98,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 rate
             }
         };
-        if self.has_unknowns() {
+        if self.has_open(i) {
             let ng = self.tree.unknowns.len();
-            for h in self.elimination(i).open_after(0) {
+            self.elimination(i).each_open_after(|h| {
                 sol.unknown_rate[h] = sol.unknown_rate[h] + f.cross[freedom * ng + h] * e;
-            }
+            });
         }
         sol.e[freedom] = e;
     }
@@ -194,7 +194,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             (None, Source::Drive { .. }) => sol.e[freedom],
             (None, Source::State { .. }) => {
                 let pivot = &f.pivots[freedom];
-                let less_open = |rate: S| match self.has_unknowns() {
+                let less_open = |rate: S| match self.has_open(i) {
                     true => self.less_open(i, freedom, f, &sol.unknown_rate, rate),
                     false => rate,
                 };

@@ -63,25 +63,25 @@ impl<'b, S: Scalar> Steps<'b, S> {
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Whether the frame of the parent of node `i` does not turn with its body: then the placement of node `i` in it
     /// does.
-    #[inline]
+    #[inline(always)]
     pub(super) fn placement_turns(&self, i: usize) -> bool {
         !T::PLAIN && self.tree.nodes[i].parent.is_some_and(|p| self.elimination(p).non_rotating)
     }
 
     /// Steps from the parent frame to node `i`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn steps<'b>(&self, w: &'b Poses<S>, i: usize) -> Steps<'b, S> {
         Steps(w.steps.all(i))
     }
 
     /// The part of [`Sweeps::steps`] ahead of the frame that node `i` is eliminated in.
-    #[inline]
+    #[inline(always)]
     pub(super) fn entering<'b>(&self, w: &'b Poses<S>, i: usize) -> Steps<'b, S> {
         Steps(if self.elimination(i).before_joint { w.steps.placing(i) } else { w.steps.all(i) })
     }
 
     /// The rest: from there to the node frame.
-    #[inline]
+    #[inline(always)]
     pub(super) fn leaving<'b>(&self, w: &'b Poses<S>, i: usize) -> Steps<'b, S> {
         Steps(if self.elimination(i).before_joint { w.steps.own(i) } else { &[] })
     }
