@@ -88,7 +88,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             (true, true) => steps.set(i, &[], 2, [px, py, slide]),
         }
         if self.elimination(i).non_rotating {
-            let inertia = RigidInertia::from_articulated(&turn.inertia(&node.inertia.articulated()));
+            let RigidInertia { mass, moment, inertia } = node.inertia;
+            let (moment, inertia) = (turn.vector_back(moment), turn.turn_symmetric(&inertia));
+            let inertia = RigidInertia { mass, moment, inertia };
             w.body[i] = TurnedBody { angle, quarter, c, s, inertia };
         }
     }

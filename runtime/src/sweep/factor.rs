@@ -87,15 +87,17 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             }
         }
         for (g, shared) in self.tree.unknowns.iter().enumerate() {
-            f.gram[g * ng + g] = S::zero();
-            let clear = |h: usize, gram: &mut [S]| {
-                gram[g * ng + h] = S::zero();
-                gram[h * ng + g] = S::zero();
-            };
             match shared {
-                Unknown::Velocity(_) => (0..ng).for_each(|h| clear(h, &mut f.gram)),
+                Unknown::Velocity(_) => {
+                    f.gram[g * ng..][..ng].fill(S::zero());
+                    let rows = self.tree.unknowns.iter().enumerate().filter(|(_, h)| matches!(h, Unknown::Row(_)));
+                    rows.for_each(|(h, _)| f.gram[h * ng + g] = S::zero());
+                }
                 Unknown::Row(r) => {
-                    f.later[g].iter().for_each(|&h| clear(h, &mut f.gram));
+                    for &h in &f.later[g] {
+                        f.gram[g * ng + h] = S::zero();
+                        f.gram[h * ng + g] = S::zero();
+                    }
                     f.gram[g * ng + g] = -self.compliance(*r);
                 }
             }
