@@ -3,7 +3,7 @@
 use super::pass::{each_node, visit_force, Sweep};
 use super::{Quantity, Sweeps, Trace};
 use crate::spatial::{ArticulatedInertia, Force, Motion};
-use crate::tree::{Freedom, Kind, Node, Source};
+use crate::tree::{each_freedom, Freedom, Kind, Node, Source};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
@@ -72,10 +72,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.trace.at(Some(i), Quantity::MomentumRate);
         if self.elimination(i).accumulates_momentum {
             let mut motion = w.velocity.hat[i];
-            node.kind.axis(0).add_to(&mut motion, w.velocity.rate[w.first[i]]);
-            let axis = node.kind.axis(0);
-            let sum = self.applied(w, i, &axis) - axis.dot(&motion.cross_force(&w.force[i]));
-            pd[v] = pd[v] + node.ratio * (sum + self.passive(node, w, i, 0));
+            each_freedom!(node.kind, |_k, axis| {
+                axis.add_to(&mut motion, w.velocity.rate[w.first[i]]);
+                let sum = self.applied(w, i, &axis) - axis.dot(&motion.cross_force(&w.force[i]));
+                pd[v] = pd[v] + node.ratio * (sum + self.passive(node, w, i, 0));
+            });
             return;
         }
         let m = &w.factor.m[i];
