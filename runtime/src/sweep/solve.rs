@@ -262,8 +262,15 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             node.kind.axis(0).add_to(&mut motion, sol.rate[first[i]]);
             own = self.elimination(i).unknown;
         }
-        let open = self.elimination(i).open.iter().chain(&self.elimination(i).ends).filter(|&&g| Some(g) != own);
-        (motion, open.fold(sol.d[i], |d, &g| d.plus(&f.columns[g * n + i].times(sol.unknown_rate[g]))))
+        let mut d = sol.d[i];
+        for open in [&self.elimination(i).open, &self.elimination(i).ends] {
+            for &g in open {
+                if Some(g) != own {
+                    d = d.plus(&f.columns[g * n + i].times(sol.unknown_rate[g]));
+                }
+            }
+        }
+        (motion, d)
     }
 
     /// Rates of the velocities of node `i` out of a solution.
