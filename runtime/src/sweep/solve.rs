@@ -201,11 +201,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 if let Freedom::Unit(z) = axis {
                     // Ω along E comes first and the rate as a difference: nothing is taken off to be added again.
                     let mut row = pivot.k;
-                    *row.get_mut(z) = -(pivot.armature * pivot.rho);
-                    let total = less_open(sol.e[freedom] - row.dot(omega));
-                    let rate = total - omega.get(z);
-                    *omega.get_mut(z) = total;
-                    return rate;
+                    return for_component!(z, |z| {
+                        *row.get_mut(z) = -(pivot.armature * pivot.rho);
+                        let total = less_open(sol.e[freedom] - row.dot(omega));
+                        let rate = total - omega.get(z);
+                        *omega.get_mut(z) = total;
+                        rate
+                    });
                 }
                 less_open(sol.e[freedom] - pivot.k.dot(omega))
             }
