@@ -91,7 +91,10 @@ impl<S: Scalar> NodeSteps<S> {
         let (motion, end) = (first + place.len() + placing, first + place.len() + N);
         self.spans[i] = Span { first, motion, end };
         let (constant, own) = self.steps[first..end].split_at_mut(place.len());
-        constant.copy_from_slice(place);
+        // A loop, since there is seldom more than one.
+        for (to, step) in constant.iter_mut().zip(place) {
+            *to = *step;
+        }
         for (to, step) in own.iter_mut().zip(steps) {
             *to = step;
         }

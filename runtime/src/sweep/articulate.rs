@@ -108,9 +108,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         let Source::State { q: at, v: vat } = node.source else { return };
         self.trace.at(Some(i), Quantity::Rate);
+        if let Kind::Revolute | Kind::Prismatic | Kind::Helical { .. } = node.kind {
+            qd[at] = v[vat];
+            return;
+        }
         let (q, v, qd) = (&q[at..], &v[vat..], &mut qd[at..]);
         match node.kind {
-            Kind::Revolute | Kind::Prismatic | Kind::Helical { .. } => qd[0] = v[0],
+            Kind::Revolute | Kind::Prismatic | Kind::Helical { .. } => {}
             Kind::Planar => {
                 let (s, c) = quarter_turn((q[2] + node.phase).sin_cos(), node.quarter);
                 let out = ElementaryTransform::Turn { axis: Axis::Z, c, s }.vector_back([v[0], v[1], v[2]]);
