@@ -90,7 +90,7 @@ pub enum Freedom<S> {
 
 impl<S: Scalar> Freedom<S> {
     /// `E · F`.
-    #[inline(always)]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn dot(&self, f: &Force<S>) -> S {
         match self {
             Freedom::Unit(k) => for_component!(*k, |k| f.get(k)),
@@ -112,7 +112,7 @@ impl<S: Scalar> Freedom<S> {
     }
 
     /// Adds `E rate` to a motion.
-    #[inline(always)]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn add_to(&self, m: &mut Motion<S>, rate: S) {
         match self {
             Freedom::Unit(k) => for_component!(*k, |k| *m.get_mut(k) = m.get(k) + rate),

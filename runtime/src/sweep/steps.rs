@@ -5,7 +5,8 @@ use crate::spatial::{ArticulatedInertia, ElementaryTransform, Force, Motion, Vec
 use crate::workspace::Poses;
 use crate::Scalar;
 
-/// Steps from a frame to one further outward.
+/// Steps from a frame to one further outward. What carries a quantity along them is compiled as part of each caller, which
+/// keeps the quantity in registers; only for WebAssembly, where size counts, it is one function.
 #[derive(Clone, Copy)]
 pub(super) struct Steps<'b, S>(&'b [ElementaryTransform<S>]);
 
@@ -17,7 +18,7 @@ impl<'b, S: Scalar> Steps<'b, S> {
     }
 
     /// A motion given at the inner frame, at the outer frame: `X Ω`.
-    #[inline(always)]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn motion(self, mut m: Motion<S>) -> Motion<S> {
         for step in self.0 {
             step.carry_motion(&mut m);
@@ -26,7 +27,7 @@ impl<'b, S: Scalar> Steps<'b, S> {
     }
 
     /// Components of a vector of the inner frame in the outer frame.
-    #[inline(always)]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn vector(self, mut x: Vec3<S>) -> Vec3<S> {
         for step in self.0 {
             step.carry_vector(&mut x);
@@ -35,7 +36,7 @@ impl<'b, S: Scalar> Steps<'b, S> {
     }
 
     /// A momentum or wrench given at the outer frame, at the inner frame: `Xᵀ P`.
-    #[inline(always)]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn force(self, mut f: Force<S>) -> Force<S> {
         for step in self.0.iter().rev() {
             step.carry_force(&mut f);
@@ -51,7 +52,7 @@ impl<'b, S: Scalar> Steps<'b, S> {
     }
 
     /// First moment of a mass `m`, given in the outer frame, in the inner frame.
-    #[inline(always)]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn moment(self, m: S, mut s: Vec3<S>) -> Vec3<S> {
         for step in self.0.iter().rev() {
             s = step.moment(m, s);
