@@ -80,9 +80,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let ([px, py], slide) = (placing, shift(Axis::Z, slide));
         let steps = &mut w.steps;
         match (turns, self.elimination(i).non_rotating) {
-            (false, false) if !node.slides => steps.set(i, &node.place, 0, [turn]),
+            (false, false) if T::PLAIN && !node.slides => steps.set(i, &node.place, 0, [turn]),
             (false, false) => steps.set(i, &node.place, 0, [slide, turn]),
-            (false, true) if !node.slides => steps.set(i, &node.place, 0, []),
             (false, true) => steps.set(i, &node.place, 0, [slide]),
             (true, false) => steps.set(i, &[], 2, [px, py, slide, turn]),
             (true, true) => steps.set(i, &[], 2, [px, py, slide]),
