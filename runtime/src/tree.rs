@@ -90,10 +90,10 @@ pub enum Freedom<S> {
 
 impl<S: Scalar> Freedom<S> {
     /// `E · F`.
-    #[inline]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn dot(&self, f: &Force<S>) -> S {
         match self {
-            Freedom::Unit(k) => f.get(*k),
+            Freedom::Unit(k) => for_component!(*k, |k| f.get(k)),
             Freedom::Screw(h) => f.ang[2] + *h * f.lin[2],
         }
     }
@@ -112,9 +112,10 @@ impl<S: Scalar> Freedom<S> {
     }
 
     /// Adds `E rate` to a motion.
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn add_to(&self, m: &mut Motion<S>, rate: S) {
         match self {
-            Freedom::Unit(k) => *m.get_mut(*k) = m.get(*k) + rate,
+            Freedom::Unit(k) => for_component!(*k, |k| *m.get_mut(k) = m.get(k) + rate),
             Freedom::Screw(h) => {
                 m.ang[2] = m.ang[2] + rate;
                 m.lin[2] = m.lin[2] + *h * rate;

@@ -12,8 +12,8 @@ use crate::Scalar;
 /// Results of the articulation: variable steps of every joint.
 #[derive(Clone, Debug)]
 pub struct Poses<S> {
-    /// Steps from the constant placement to the node frame.
-    pub joint: Vec<JointSteps<S>>,
+    /// Steps from the parent frame to the node frame.
+    pub steps: NodeSteps<S>,
     /// Joint coordinates of nodes a spring can act on, three slots each: `ratio · source + offset`.
     pub coordinates: Vec<[S; 3]>,
     /// For nodes with non-rotating frames: orientation of the body in its frame, and its inertia there.
@@ -49,62 +49,76 @@ impl<S: Scalar> TurnedBody<S> {
     }
 }
 
-/// At most four elementary transforms, stored in place.
-#[derive(Clone, Copy, Debug)]
-pub struct JointSteps<S> {
-    steps: [ElementaryTransform<S>; 4],
-    len: usize,
-    placing: usize,
+/// The elementary transforms from every node's parent frame to its own frame, those of all nodes one after the other.
+#[derive(Clone, Debug)]
+pub struct NodeSteps<S> {
+    steps: Vec<ElementaryTransform<S>>,
+    spans: Vec<Span>,
 }
 
-impl<S: Scalar> JointSteps<S> {
-    /// No transforms.
-    pub fn new() -> Self {
-        JointSteps {
-            steps: [ElementaryTransform::Shift { axis: crate::spatial::Axis::Z, r: S::zero() }; 4],
-            len: 0,
-            placing: 0,
+/// Where the steps of a node lie: those of the constant placement, then those of the joint's motion.
+#[derive(Clone, Copy, Debug, Default)]
+struct Span {
+    first: usize,
+    motion: usize,
+    end: usize,
+}
+
+impl<S: Scalar> NodeSteps<S> {
+    /// At most so many steps represent the motion of a joint and a placement that turns.
+    const MOST: usize = 4;
+
+    /// Room for the steps of the nodes of a tree.
+    fn new(tree: &Tree<S>) -> Self {
+        let none = ElementaryTransform::Shift { axis: crate::spatial::Axis::Z, r: S::zero() };
+        let room = |tree: &Tree<S>| tree.nodes.iter().map(|node| node.place.len() + Self::MOST).sum();
+        let room = usize::max(room(tree), room(tree.for_accelerations()));
+        NodeSteps { steps: vec![none; room], spans: vec![Span::default(); tree.nodes.len()] }
+    }
+
+    /// Replaces the steps of node `i` after those of the nodes before it: constant ones, and those that depend on the
+    /// coordinates, of which the first `placing` represent the placement too.
+    #[inline(always)]
+    pub fn set<const N: usize>(
+        &mut self,
+        i: usize,
+        place: &[ElementaryTransform<S>],
+        placing: usize,
+        steps: [ElementaryTransform<S>; N],
+    ) {
+        const { assert!(N <= Self::MOST, "a joint has at most four steps") };
+        let first = i.checked_sub(1).map_or(0, |before| self.spans[before].end);
+        let (motion, end) = (first + place.len() + placing, first + place.len() + N);
+        self.spans[i] = Span { first, motion, end };
+        let (constant, own) = self.steps[first..end].split_at_mut(place.len());
+        // A loop, since there is seldom more than one.
+        for (to, step) in constant.iter_mut().zip(place) {
+            *to = *step;
         }
-    }
-
-    /// Replaces the transforms; there are at most four.
-    #[inline(always)]
-    pub fn set<const N: usize>(&mut self, steps: [ElementaryTransform<S>; N]) {
-        self.set_with(0, steps);
-    }
-
-    /// The same, where the first `placing` transforms represent the constant placement.
-    #[inline(always)]
-    pub fn set_with<const N: usize>(&mut self, placing: usize, steps: [ElementaryTransform<S>; N]) {
-        const { assert!(N <= 4, "a joint has at most four steps") };
-        (self.placing, self.len) = (placing, N);
-        for (to, step) in self.steps.iter_mut().zip(steps) {
+        for (to, step) in own.iter_mut().zip(steps) {
             *to = step;
         }
     }
 
-    /// The transforms, from parent to child.
-    #[inline]
-    pub fn get(&self) -> &[ElementaryTransform<S>] {
-        &self.steps[..self.len]
+    /// All steps of node `i`, from parent to child.
+    #[inline(always)]
+    pub fn all(&self, i: usize) -> &[ElementaryTransform<S>] {
+        let span = self.spans[i];
+        &self.steps[span.first..span.end]
     }
 
-    /// The transforms of the constant placement.
-    #[inline]
-    pub fn placing(&self) -> &[ElementaryTransform<S>] {
-        &self.steps[..self.placing.min(self.len)]
+    /// The steps of the constant placement of node `i`.
+    #[inline(always)]
+    pub fn placing(&self, i: usize) -> &[ElementaryTransform<S>] {
+        let span = self.spans[i];
+        &self.steps[span.first..span.motion]
     }
 
-    /// The transforms of the joint's motion.
-    #[inline]
-    pub fn own(&self) -> &[ElementaryTransform<S>] {
-        &self.steps[self.placing.min(self.len)..self.len]
-    }
-}
-
-impl<S: Scalar> Default for JointSteps<S> {
-    fn default() -> Self {
-        Self::new()
+    /// The steps of the motion of the joint of node `i`.
+    #[inline(always)]
+    pub fn own(&self, i: usize) -> &[ElementaryTransform<S>] {
+        let span = self.spans[i];
+        &self.steps[span.motion..span.end]
     }
 }
 
@@ -304,7 +318,7 @@ impl<S: Scalar> Workspace<S> {
         };
         Workspace {
             first,
-            poses: Poses { joint: vec![JointSteps::new(); n], coordinates: vec![[o; 3]; n], body: vec![upright; n] },
+            poses: Poses { steps: NodeSteps::new(tree), coordinates: vec![[o; 3]; n], body: vec![upright; n] },
             factor: Factor {
                 m: vec![ArticulatedInertia::zero(); n],
                 pivots: vec![pivot; f],

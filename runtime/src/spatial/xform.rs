@@ -277,12 +277,12 @@ impl<S: Scalar> ElementaryTransform<S> {
     }
 
     /// A symmetric tensor `[xx, xy, xz, yy, yz, zz]` given in the child's axes, in the parent's axes.
+    #[inline]
     pub fn turn_symmetric(&self, m: &[S; 6]) -> [S; 6] {
         match self {
             ElementaryTransform::Turn { axis, c, s } => {
-                let (a, b, n) = axis.cyclic();
                 let mut m = *m;
-                turn_sym(*c, *s, &mut m, a, b, n);
+                for_axis!(axis, |a, b, n| turn_sym(*c, *s, &mut m, a, b, n));
                 m
             }
             ElementaryTransform::Shift { .. } => *m,

@@ -41,18 +41,22 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
         match node.kind {
             Kind::Revolute => self.revolute(i, x, w),
-            Kind::Prismatic => w.joint[i].set([turn(S::zero()), shift(Axis::Z, node.slide + x)]),
-            Kind::Helical { pitch } => w.joint[i].set([shift(Axis::Z, node.slide + pitch * x), turn(x)]),
-            Kind::Planar => w.joint[i].set([shift(Axis::X, q[0]), shift(Axis::Y, q[1]), turn(q[2])]),
-            Kind::Spherical => {
-                w.joint[i].set([ElementaryTransform::Rotate(quaternion_matrix([q[0], q[1], q[2], q[3]]))])
+            Kind::Prismatic => w.steps.set(i, &node.place, 0, [turn(S::zero()), shift(Axis::Z, node.slide + x)]),
+            Kind::Helical { pitch } => {
+                w.steps.set(i, &node.place, 0, [shift(Axis::Z, node.slide + pitch * x), turn(x)]);
             }
-            Kind::Floating => w.joint[i].set([
-                shift(Axis::X, q[0]),
-                shift(Axis::Y, q[1]),
-                shift(Axis::Z, q[2]),
-                ElementaryTransform::Rotate(quaternion_matrix([q[3], q[4], q[5], q[6]])),
-            ]),
+            Kind::Planar => {
+                w.steps.set(i, &node.place, 0, [shift(Axis::X, q[0]), shift(Axis::Y, q[1]), turn(q[2])]);
+            }
+            Kind::Spherical => {
+                let turn = ElementaryTransform::Rotate(quaternion_matrix([q[0], q[1], q[2], q[3]]));
+                w.steps.set(i, &node.place, 0, [turn]);
+            }
+            Kind::Floating => {
+                let turn = ElementaryTransform::Rotate(quaternion_matrix([q[3], q[4], q[5], q[6]]));
+                let to = [shift(Axis::X, q[0]), shift(Axis::Y, q[1]), shift(Axis::Z, q[2]), turn];
+                w.steps.set(i, &node.place, 0, to);
+            }
         }
     }
 
@@ -74,15 +78,18 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let (s, c) = quarter_turn(angle.sin_cos(), quarter);
         let turn = ElementaryTransform::Turn { axis: Axis::Z, c, s };
         let ([px, py], slide) = (placing, shift(Axis::Z, slide));
+        let steps = &mut w.steps;
         match (turns, self.elimination(i).non_rotating) {
-            (false, false) if T::PLAIN && !node.slides => w.joint[i].set([turn]),
-            (false, false) => w.joint[i].set([slide, turn]),
-            (false, true) => w.joint[i].set([slide]),
-            (true, false) => w.joint[i].set_with(2, [px, py, slide, turn]),
-            (true, true) => w.joint[i].set_with(2, [px, py, slide]),
+            (false, false) if T::PLAIN && !node.slides => steps.set(i, &node.place, 0, [turn]),
+            (false, false) => steps.set(i, &node.place, 0, [slide, turn]),
+            (false, true) => steps.set(i, &node.place, 0, [slide]),
+            (true, false) => steps.set(i, &[], 2, [px, py, slide, turn]),
+            (true, true) => steps.set(i, &[], 2, [px, py, slide]),
         }
         if self.elimination(i).non_rotating {
-            let inertia = RigidInertia::from_articulated(&turn.inertia(&node.inertia.articulated()));
+            let RigidInertia { mass, moment, inertia } = node.inertia;
+            let (moment, inertia) = (turn.vector_back(moment), turn.turn_symmetric(&inertia));
+            let inertia = RigidInertia { mass, moment, inertia };
             w.body[i] = TurnedBody { angle, quarter, c, s, inertia };
         }
     }
@@ -100,9 +107,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         let Source::State { q: at, v: vat } = node.source else { return };
         self.trace.at(Some(i), Quantity::Rate);
+        if let Kind::Revolute | Kind::Prismatic | Kind::Helical { .. } = node.kind {
+            qd[at] = v[vat];
+            return;
+        }
         let (q, v, qd) = (&q[at..], &v[vat..], &mut qd[at..]);
         match node.kind {
-            Kind::Revolute | Kind::Prismatic | Kind::Helical { .. } => qd[0] = v[0],
+            Kind::Revolute | Kind::Prismatic | Kind::Helical { .. } => {}
             Kind::Planar => {
                 let (s, c) = quarter_turn((q[2] + node.phase).sin_cos(), node.quarter);
                 let out = ElementaryTransform::Turn { axis: Axis::Z, c, s }.vector_back([v[0], v[1], v[2]]);

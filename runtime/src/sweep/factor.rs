@@ -8,6 +8,23 @@ use crate::tree::{each_freedom, for_component, Freedom, Source, Unknown};
 use crate::workspace::{Factor, Pivot, Poses};
 use crate::Scalar;
 
+/// Evaluates an expression at the places of the upper triangle of a 6×6 matrix, row by row. They are constants where it
+/// is compiled.
+macro_rules! upper_triangle {
+    (|$a:ident, $b:ident| $result:expr) => {
+        upper_triangle!(@ $a, $b, $result, 0: 0 1 2 3 4 5; 1: 1 2 3 4 5; 2: 2 3 4 5; 3: 3 4 5; 4: 4 5; 5: 5)
+    };
+    (@ $i:ident, $k:ident, $result:expr, $($a:literal: $($b:literal)*);*) => {
+        $(upper_triangle!(@row $i, $k, $result, $a: $($b)*);)*
+    };
+    (@row $i:ident, $k:ident, $result:expr, $a:literal: $($b:literal)*) => {
+        $({
+            let ($i, $k) = ($a, $b);
+            $result
+        })*
+    };
+}
+
 impl<S: Scalar, T: Trace> Sweep<S, T> {
     /// `M*`, `U`, `Mj`, `M'` (4.48, 4.44), and the columns of unknowns that are still open.
     pub(super) const FACTOR: Self = Sweep {
@@ -64,27 +81,25 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
         f.whole.fill(S::zero());
         for i in 0..n {
-            for g in self.elimination(i).open_before(0).chain(self.elimination(i).unknown) {
+            self.elimination(i).each_open_before(|g| f.columns[g * n + i] = Force::zero());
+            if let Some(g) = self.elimination(i).unknown {
                 f.columns[g * n + i] = Force::zero();
             }
         }
         for (g, shared) in self.tree.unknowns.iter().enumerate() {
-            f.gram[g * ng + g] = S::zero();
-            let clear = |h: usize, gram: &mut [S]| {
-                gram[g * ng + h] = S::zero();
-                gram[h * ng + g] = S::zero();
-            };
             match shared {
-                Unknown::Velocity(_) => (0..ng).for_each(|h| clear(h, &mut f.gram)),
+                Unknown::Velocity(_) => {
+                    f.gram[g * ng..][..ng].fill(S::zero());
+                    let rows = self.tree.unknowns.iter().enumerate().filter(|(_, h)| matches!(h, Unknown::Row(_)));
+                    rows.for_each(|(h, _)| f.gram[h * ng + g] = S::zero());
+                }
                 Unknown::Row(r) => {
                     let compliance = self.compliance(*r);
                     for &h in &f.later[g] {
-                        clear(h, &mut f.gram);
-                        // The same row in another pass.
-                        if self.tree.unknowns[h] == *shared {
-                            f.gram[g * ng + h] = -compliance;
-                            f.gram[h * ng + g] = -compliance;
-                        }
+                        // The same row may come again in another pass.
+                        let start = if self.tree.unknowns[h] == *shared { -compliance } else { S::zero() };
+                        f.gram[g * ng + h] = start;
+                        f.gram[h * ng + g] = start;
                     }
                     f.gram[g * ng + g] = -compliance;
                 }
@@ -118,9 +133,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         name::inertia(self.trace, "m", &f.m[i]); // M*_i (4.48)
         if self.elimination(i).before_joint {
             self.leaving(poses, i).carry_inertia(&mut f.m[i]);
-            for g in self.elimination(i).open_before(0) {
-                f.columns[g * n + i] = self.leaving(poses, i).force(f.columns[g * n + i]);
-            }
+            let leaving = self.leaving(poses, i);
+            self.elimination(i).each_open_before(|g| {
+                f.columns[g * n + i] = leaving.force(f.columns[g * n + i]);
+            });
         }
         self.trace.at(Some(i), Quantity::Pivot);
         for (k, &g) in self.elimination(i).solve_before.iter().enumerate() {
@@ -165,8 +181,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         let u = column(&e, &f.m[i]); // U = M* E
         name::force(self.trace, "u", &u);
-        if self.has_unknowns() {
+        if self.has_open(i) {
             self.cross_open(i, &e, freedom, f);
+        }
+        if self.has_unknowns() {
             if let Some(g) = self.elimination(i).unknown {
                 return self.add_to_open(i, g, &e, freedom, &u.times(node.ratio), f);
             }
@@ -179,7 +197,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         reduce(&e, u, armature, &mut f.m[i], pivot);
         name::force(self.trace, "k", &pivot.k);
         self.trace.name(pivot.rho, "rho", "");
-        if self.has_unknowns() {
+        if self.has_open(i) {
             self.reduce_open(i, freedom, f);
         }
     }
@@ -187,9 +205,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Inertia between a freedom of node `i` and the open unknowns.
     fn cross_open(&self, i: usize, e: &Freedom<S>, freedom: usize, f: &mut Factor<S>) {
         let (n, ng) = (self.tree.nodes.len(), self.tree.unknowns.len());
-        for h in self.elimination(i).open_after(0) {
+        self.elimination(i).each_open_after(|h| {
             f.cross[freedom * ng + h] = e.dot(&f.columns[h * n + i]) + self.coupled(i, h);
-        }
+        });
     }
 
     /// Adds the column of the freedom of node `i` to that of its unknown `g`.
@@ -200,11 +218,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let column = f.columns[g * n + i].plus(column);
         let rotor = a * a * node.passive[0].armature;
         f.gram[g * ng + g] = f.gram[g * ng + g] + a * (old + e.dot(&column)) + rotor;
-        for h in self.elimination(i).open_after(0).filter(|&h| h != g) {
-            let x = f.gram[g * ng + h] + a * f.cross[freedom * ng + h];
-            f.gram[g * ng + h] = x;
-            f.gram[h * ng + g] = x;
-        }
+        self.elimination(i).each_open_after(|h| {
+            if h != g {
+                let x = f.gram[g * ng + h] + a * f.cross[freedom * ng + h];
+                f.gram[g * ng + h] = x;
+                f.gram[h * ng + g] = x;
+            }
+        });
         f.columns[g * n + i] = column;
     }
 
@@ -218,10 +238,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             if let Unknown::Row(_) = self.tree.unknowns[h] {
                 f.whole[h] = f.whole[h] + c * (pivot.rho * c);
             }
-            for h2 in self.elimination(i).open_after(0) {
+            self.elimination(i).each_open_after(|h2| {
                 let c2 = f.cross[freedom * ng + h2];
                 f.gram[h * ng + h2] = f.gram[h * ng + h2] - self.product(f, pivot.rho, (h, c), (h2, c2));
-            }
+            });
         }
     }
 
@@ -261,7 +281,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let k = u.times(rho);
         if let Some(i) = i {
             let m = &mut f.m[i];
-            upper_triangle(|a, b| *m.get_mut(a, b) = m.get(a, b) - u.get(a) * k.get(b));
+            upper_triangle!(|a, b| *m.get_mut(a, b) = m.get(a, b) - u.get(a) * k.get(b));
         }
         for h in open.clone() {
             f.unknown_cross[g * ng + h] = f.gram[g * ng + h];
@@ -281,16 +301,6 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
         f.unknown_pivots[g] = Pivot { u, k, rho, armature: S::zero() };
     }
-}
-
-/// Calls a function with the places of the upper triangle of a 6×6 matrix, row by row. They are constants where it is
-/// compiled.
-#[inline(always)]
-fn upper_triangle(mut at: impl FnMut(usize, usize)) {
-    macro_rules! rows {
-        ($($a:literal: $($b:literal)*;)*) => { $($(at($a, $b);)*)* };
-    }
-    rows!(0: 0 1 2 3 4 5; 1: 1 2 3 4 5; 2: 2 3 4 5; 3: 3 4 5; 4: 4 5; 5: 5;);
 }
 
 /// `U = M* E`.
@@ -333,7 +343,7 @@ fn reduce<S: Scalar>(e: &Freedom<S>, u: Force<S>, armature: S, m: &mut Articulat
 /// Entries of `M* − U kᵀ` outside row and column `known`.
 #[inline(always)]
 fn reduce_others<S: Scalar>(known: usize, u: &Force<S>, k: &Force<S>, m: &mut ArticulatedInertia<S>) {
-    upper_triangle(|a, b| {
+    upper_triangle!(|a, b| {
         if a != known && b != known {
             *m.get_mut(a, b) = m.get(a, b) - u.get(a) * k.get(b);
         }

@@ -150,6 +150,12 @@ impl<'a, S: Scalar, T: Trace> Sweeps<'a, S, T> {
         !T::PLAIN && !self.tree.unknowns.is_empty()
     }
 
+    /// Whether columns of unknowns pass through node `i` or end there.
+    #[inline(always)]
+    fn has_open(&self, i: usize) -> bool {
+        self.has_unknowns() && !self.elimination(i).is_closed()
+    }
+
     /// How the freedoms of node `i` are eliminated: a constant where the tree is known to be plain.
     #[inline(always)]
     fn elimination(&self, i: usize) -> &Elimination {

@@ -58,11 +58,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Velocity);
         let mut m = self.classic_motion(node.parent, u, w);
-        self.place(&w.poses, i).iter().chain(w.poses.joint[i].placing()).for_each(|step| m.carry(step));
+        w.poses.steps.placing(i).iter().for_each(|step| m.carry(step));
         // A translation along the axis of a rotation is applied after it, where `B` is that of the body.
-        let steps = w.poses.joint[i].own();
-        let late = match node.kind {
-            Kind::Revolute | Kind::Helical { .. } => Some(0),
+        let steps = w.poses.steps.own(i);
+        let late = match (node.kind, steps.first()) {
+            (Kind::Revolute | Kind::Helical { .. }, Some(ElementaryTransform::Shift { .. })) => Some(0),
             _ => None,
         };
         for (k, step) in steps.iter().enumerate() {

@@ -177,11 +177,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         pd: &mut [S],
     ) {
         let (given, results) = (Arguments::new(q, p, u), Results { v, qd, p: pd, ..Results::none() });
-        if T::PLAIN {
-            self.articulate(q, u.drive_q, &mut w.poses);
-            return plain_rates(self.tree, self.trace, &given, w, results);
-        }
-        self.context(&given, w, results).run(SweepList::RATES);
+        self.articulate(q, u.drive_q, &mut w.poses);
+        rates_of_steps(self.tree, self.trace, &given, w, results);
     }
 
     /// Kinetic and potential energy, J. The potential is zero with every moving mass at the height of the ground's
@@ -377,15 +374,20 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 }
 
-/// [`Sweeps::rates`] of a plain tree after its joints' steps. A function of its own, to which nobody else has references:
+/// [`Sweeps::rates`] after the joints' steps. A function of its own, to which nobody else has references:
 /// so the compiler knows that the lengths of the vectors stay what they are.
 #[inline(never)]
-fn plain_rates<S: Scalar, T: Trace>(
+fn rates_of_steps<S: Scalar, T: Trace>(
     tree: &Tree<S>,
     trace: &T,
     given: &Arguments<'_, S>,
     w: &mut Workspace<S>,
     results: Results<'_, S>,
 ) {
-    Sweeps { tree, trace }.context(given, w, results).run_together(SweepList::RATES);
+    let sweeps = Sweeps { tree, trace };
+    let mut cx = sweeps.context(given, w, results);
+    match T::PLAIN {
+        true => cx.run_together(SweepList::RATES),
+        false => cx.run_after_steps(SweepList::RATES),
+    }
 }

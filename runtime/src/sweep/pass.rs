@@ -194,11 +194,17 @@ impl<S: Scalar, T: Trace> Context<'_, S, T> {
     #[inline(always)]
     pub(super) fn run<const N: usize>(&mut self, list: SweepList<S, T, N>) {
         self.articulate();
+        self.run_after_steps(list);
+    }
+
+    /// [`Context::run`] after [`Context::articulate`].
+    #[inline(always)]
+    pub(super) fn run_after_steps<const N: usize>(&mut self, list: SweepList<S, T, N>) {
         self.sweep(list.sweeps);
         (list.finish)(self);
     }
 
-    /// [`Context::run`] after [`Context::articulate`] for an output that takes a plain tree one pass inward and one
+    /// [`Context::run_after_steps`] for an output that takes a plain tree one pass inward and one
     /// outward (as [`passes`] says): all sweeps of a pass visit a node together, while its numbers are at hand.
     #[inline(always)]
     pub(super) fn run_together<const N: usize>(&mut self, list: SweepList<S, T, N>) {

@@ -3,7 +3,7 @@
 use super::pass::{each_node, visit_force, Sweep};
 use super::{Quantity, Sweeps, Trace};
 use crate::spatial::{ArticulatedInertia, Force, Motion};
-use crate::tree::{Freedom, Kind, Node, Source};
+use crate::tree::{each_freedom, for_component, Freedom, Kind, Node, Source};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
@@ -42,21 +42,22 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     fn accumulate_node(&self, i: usize, p: &[S], w: &mut Workspace<S>) {
         let node = &self.tree.nodes[i];
         self.trace.at(Some(i), Quantity::Momentum);
-        if self.elimination(i).accumulates_momentum {
-            w.force[i] = self.leaving(&w.poses, i).force(w.force[i]);
+        let accumulates = self.elimination(i).accumulates_momentum;
+        let mut total = w.force[i];
+        if accumulates {
+            total = self.leaving(&w.poses, i).force(total);
+            w.force[i] = total;
         }
         let Some(parent) = node.parent.filter(|&p| self.elimination(p).accumulates_momentum) else { return };
-        let mut total = match self.elimination(i).accumulates_momentum {
-            true => w.force[i],
-            false => {
-                let (motion, d) = self.acting(&w.first, &w.factor, &w.velocity, i);
-                w.factor.m[i].times(&motion).plus(&d)
-            }
-        };
+        if !accumulates {
+            let (motion, d) = self.acting(&w.first, &w.factor, &w.velocity, i);
+            total = w.factor.m[i].times(&motion).plus(&d);
+        }
         if let (Freedom::Unit(z), 1, Source::State { v, .. }) = (node.kind.axis(0), node.kind.nv(), node.source) {
             if self.elimination(i).unknown.is_none() || self.elimination(i).deferred {
                 let rotor = node.passive[0].armature * w.velocity.rate[w.first[i]];
-                *total.get_mut(z) = p[v] - rotor - self.coupled_momentum(i, &w.constraints.multipliers);
+                let along = p[v] - rotor - self.coupled_momentum(i, &w.constraints.multipliers);
+                for_component!(z, |z| *total.get_mut(z) = along);
             }
         }
         let out = self.entering(&w.poses, i).force(total);
@@ -72,15 +73,16 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.trace.at(Some(i), Quantity::MomentumRate);
         if self.elimination(i).accumulates_momentum {
             let mut motion = w.velocity.hat[i];
-            node.kind.axis(0).add_to(&mut motion, w.velocity.rate[w.first[i]]);
-            let axis = node.kind.axis(0);
-            let sum = self.applied(w, i, &axis) - axis.dot(&motion.cross_force(&w.force[i]));
-            pd[v] = pd[v] + node.ratio * (sum + self.passive(node, w, i, 0));
+            each_freedom!(node.kind, |_k, axis| {
+                axis.add_to(&mut motion, w.velocity.rate[w.first[i]]);
+                let sum = self.applied(w, i, &axis) - axis.dot(&motion.cross_force(&w.force[i]));
+                pd[v] = pd[v] + node.ratio * (sum + self.passive(node, w, i, 0));
+            });
             return;
         }
         let m = &w.factor.m[i];
         let acting;
-        let (hat, d) = match self.has_unknowns() {
+        let (hat, d) = match self.has_unknowns() && (self.elimination(i).deferred || self.has_open(i)) {
             true => {
                 acting = self.acting(&w.first, &w.factor, &w.velocity, i);
                 (&acting.0, &acting.1)
@@ -124,7 +126,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         match node.kind {
             Kind::Spherical | Kind::Floating => damper,
             // The springs of a planar joint act in the parent's axes.
-            Kind::Planar if k < 2 => damper - w.poses.joint[i].get()[2].vector([pull(0), pull(1), S::zero()])[k],
+            Kind::Planar if k < 2 => damper - w.poses.steps.own(i)[2].vector([pull(0), pull(1), S::zero()])[k],
             _ => damper - pull(k),
         }
     }

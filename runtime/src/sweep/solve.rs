@@ -98,11 +98,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 rate
             }
         };
-        if self.has_unknowns() {
+        if self.has_open(i) {
             let ng = self.tree.unknowns.len();
-            for h in self.elimination(i).open_after(0) {
+            self.elimination(i).each_open_after(|h| {
                 sol.unknown_rate[h] = sol.unknown_rate[h] + f.cross[freedom * ng + h] * e;
-            }
+            });
         }
         sol.e[freedom] = e;
     }
@@ -194,18 +194,20 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             (None, Source::Drive { .. }) => sol.e[freedom],
             (None, Source::State { .. }) => {
                 let pivot = &f.pivots[freedom];
-                let less_open = |rate: S| match self.has_unknowns() {
+                let less_open = |rate: S| match self.has_open(i) {
                     true => self.less_open(i, freedom, f, &sol.unknown_rate, rate),
                     false => rate,
                 };
                 if let Freedom::Unit(z) = axis {
                     // Ω along E comes first and the rate as a difference: nothing is taken off to be added again.
                     let mut row = pivot.k;
-                    *row.get_mut(z) = -(pivot.armature * pivot.rho);
-                    let total = less_open(sol.e[freedom] - row.dot(omega));
-                    let rate = total - omega.get(z);
-                    *omega.get_mut(z) = total;
-                    return rate;
+                    return for_component!(z, |z| {
+                        *row.get_mut(z) = -(pivot.armature * pivot.rho);
+                        let total = less_open(sol.e[freedom] - row.dot(omega));
+                        let rate = total - omega.get(z);
+                        *omega.get_mut(z) = total;
+                        rate
+                    });
                 }
                 less_open(sol.e[freedom] - pivot.k.dot(omega))
             }
@@ -262,8 +264,15 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             node.kind.axis(0).add_to(&mut motion, sol.rate[first[i]]);
             own = self.elimination(i).unknown;
         }
-        let open = self.elimination(i).open.iter().chain(&self.elimination(i).ends).filter(|&&g| Some(g) != own);
-        (motion, open.fold(sol.d[i], |d, &g| d.plus(&f.columns[g * n + i].times(sol.unknown_rate[g]))))
+        let mut d = sol.d[i];
+        for open in [&self.elimination(i).open, &self.elimination(i).ends] {
+            for &g in open {
+                if Some(g) != own {
+                    d = d.plus(&f.columns[g * n + i].times(sol.unknown_rate[g]));
+                }
+            }
+        }
+        (motion, d)
     }
 
     /// Rates of the velocities of node `i` out of a solution.
@@ -273,7 +282,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let Source::State { v: at, .. } = node.source else { return };
         match self.elimination(i).unknown {
             Some(g) => v[at] = sol.unknown_rate[g],
-            None => v[at..at + node.kind.nv()].copy_from_slice(&sol.rate[first[i]..first[i + 1]]),
+            None => each_freedom!(node.kind, |k| v[at + k] = sol.rate[first[i] + k]),
         }
     }
 }

@@ -48,6 +48,13 @@ impl Elimination {
         solve_after: Vec::new(),
     };
 
+    /// Whether no unknown is open at the node after its own freedoms: most nodes, which are spared all that is about
+    /// them.
+    #[inline]
+    pub(crate) fn is_closed(&self) -> bool {
+        self.solve_after.is_empty() && self.open.is_empty() && self.ends.is_empty()
+    }
+
     /// Unknowns still open after position `k` of `solve_before`.
     #[inline]
     pub(crate) fn open_before(&self, k: usize) -> impl Iterator<Item = usize> + Clone + '_ {
@@ -58,6 +65,26 @@ impl Elimination {
     #[inline]
     pub(crate) fn open_after(&self, k: usize) -> impl Iterator<Item = usize> + Clone + '_ {
         self.solve_after[k..].iter().chain(&self.open).chain(&self.ends).copied()
+    }
+
+    /// Calls a function with the unknowns of [`Elimination::open_before`]`(0)`, by loops that the compiler merges with it.
+    #[inline(always)]
+    pub(crate) fn each_open_before(&self, mut call: impl FnMut(usize)) {
+        for open in [&self.solve_before, &self.solve_after, &self.open, &self.ends] {
+            for &g in open {
+                call(g);
+            }
+        }
+    }
+
+    /// The same with those of [`Elimination::open_after`]`(0)`.
+    #[inline(always)]
+    pub(crate) fn each_open_after(&self, mut call: impl FnMut(usize)) {
+        for open in [&self.solve_after, &self.open, &self.ends] {
+            for &g in open {
+                call(g);
+            }
+        }
     }
 
     /// Keeps only the columns of some unknowns. The node's own unknown stays.

@@ -1,10 +1,23 @@
 //! Expressions that are compiled apart for each value of a number, which is a constant in them: entries of vectors and
 //! matrices are then found without computing their places.
 
-/// Evaluates an expression with the number and the column of every freedom of a joint, in order or, with `rev`, in the
+/// Evaluates an expression with the number and, if it is asked for, the column of every freedom of a joint, in order or, with `rev`, in the
 /// reverse order. It is compiled apart for the commonest kinds of joints, which have one freedom whose column is a
 /// constant.
 macro_rules! each_freedom {
+    ($kind:expr, |$k:ident| $result:expr) => {
+        match $kind {
+            $crate::tree::Kind::Revolute | $crate::tree::Kind::Prismatic => {
+                let $k = 0;
+                $result
+            }
+            kind => {
+                for $k in 0..kind.nv() {
+                    $result
+                }
+            }
+        }
+    };
     ($kind:expr, |$k:ident, $axis:ident| $result:expr) => {
         each_freedom!(@ $kind, (0..), |$k, $axis| $result)
     };

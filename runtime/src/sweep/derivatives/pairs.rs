@@ -9,20 +9,15 @@ use crate::Scalar;
 
 impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Steps from the parent's node frame to the frame that the columns of node `i` are taken in.
-    fn to_columns<'b>(
-        &'b self,
-        poses: &'b Poses<S>,
-        i: usize,
-    ) -> impl DoubleEndedIterator<Item = &'b ElementaryTransform<S>> + 'b {
-        let joint = &poses.joint[i];
-        let steps = if single(&self.tree.nodes[i]) { joint.placing() } else { joint.get() };
-        self.place(poses, i).iter().chain(steps)
+    fn to_columns<'b>(&self, poses: &'b Poses<S>, i: usize) -> core::slice::Iter<'b, ElementaryTransform<S>> {
+        let single = single(&self.tree.nodes[i]);
+        if single { poses.steps.placing(i) } else { poses.steps.all(i) }.iter()
     }
 
     /// Steps from there to the node frame.
     fn past_columns<'b>(&'b self, poses: &'b Poses<S>, i: usize) -> &'b [ElementaryTransform<S>] {
         match single(&self.tree.nodes[i]) {
-            true => poses.joint[i].own(),
+            true => poses.steps.own(i),
             false => &[],
         }
     }
@@ -247,7 +242,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 Kind::Revolute | Kind::Prismatic | Kind::Helical { .. } => take(0, 0, node.ratio * node.ratio * k(0)),
                 Kind::Planar => {
                     // The springs act in the parent's axes, the degrees of freedom in those of the node.
-                    let turn = w.poses.joint[i].get()[2];
+                    let turn = w.poses.steps.own(i)[2];
                     let o = S::zero();
                     for b in 0..2 {
                         let mut unit = [o; 3];
