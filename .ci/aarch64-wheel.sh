@@ -5,7 +5,7 @@
 #
 #     .ci/aarch64-wheel.sh python/dist/WHEEL.whl [ARGUMENTS OF pytest]
 set -euo pipefail
-wheel=$(realpath "$1")
+wheel=$(realpath "${1:?name the wheel, python/dist/WHEEL.whl}")
 shift
 tests=$(realpath "$(dirname "$0")/../python/tests")
 if ! command -v qemu-aarch64 > /dev/null; then

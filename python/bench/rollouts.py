@@ -86,6 +86,16 @@ def refine(model, other, q, u):
     other.opt.timestep = DT
 
 
+def outputs(model, repeats):
+    """Prints the time of accelerations, of states that are computed one by one and of many."""
+    random = np.random.default_rng(0)
+    for rows in (63, 4096):
+        q, v = random.uniform(-1, 1, (2, rows, model.nv))
+        out = np.empty_like(v)
+        best = min(seconds(lambda: model.accelerations(q, v, out=out)) for _ in range(20 * repeats))
+        print(f"  accelerations of {rows} states: {best / rows * 1e9:.0f} ns a state")
+
+
 def compare(name, repeats):
     """Steps a second of one robot, and how far both programs' motions are apart."""
     text = bare_urdf(name)
@@ -110,21 +120,17 @@ def compare(name, repeats):
         states, _ = theirs.rollout(other, [data], start, forces)
         apart = abs(states[:, -1, 1 : 1 + model.nv] - mine.q[:, -1][:, places]).max()
 
-        def one_by_one():
+        def one_by_one(state):
             for k in range(ROWS):
-                model.rollout((q[k], v[k]), u[k], dt=DT, threads=1)
-
-        def one_by_one_momenta():
-            for k in range(ROWS):
-                model.rollout((q[k], v[k]), u[k], dt=DT, threads=1, state="momenta")
+                model.rollout((q[k], v[k]), u[k], dt=DT, threads=1, state=state)
 
         def theirs_one_by_one():
             for k in range(ROWS):
                 theirs.rollout(other, [data], start[k : k + 1], forces[k : k + 1])
 
         ways = {
-            "one": one_by_one,
-            "one, momenta": one_by_one_momenta,
+            "one": lambda: one_by_one("velocities"),
+            "one, momenta": lambda: one_by_one("momenta"),
             "batch": lambda: model.rollout((q, v), u, dt=DT, threads=1),
             "batch, momenta": lambda: model.rollout((q, v), u, dt=DT, threads=1, state="momenta"),
             "MuJoCo one": theirs_one_by_one,
@@ -142,6 +148,7 @@ def compare(name, repeats):
     alone, together = ("MuJoCo one",), ("MuJoCo rollout", "MuJoCo Batch")
     for way, best_of in (("one", alone), ("one, momenta", alone), ("batch", together), ("batch, momenta", together)):
         print(f"  {way}: {rate[way] / max(rate[other] for other in best_of):.1f} times {' or '.join(best_of)}, the better one")
+    outputs(model, repeats)
     refine(model, other, q, u)
 
 

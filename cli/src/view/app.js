@@ -272,6 +272,7 @@ function pace(passed) {
   if (page.pace < 1 / 30 || canvas.fineness <= 0.4) return;
   [canvas.fineness, page.pace] = [Math.max(0.4, 0.75 * canvas.fineness), 0];
 }
+page.pace = 0;
 
 /** A frame of the page. */
 function tick(now) {
@@ -336,7 +337,7 @@ function draw() {
   scrub.setAttribute("aria-valuetext", `${instant.t.toFixed(3)} seconds`);
   if (page.drawn++ % 3 === 0 || !page.playing) panelDraw(ink);
 }
-[page.drawn, page.pace] = [0, 0];
+page.drawn = 0;
 
 /** Names, axes and gravity, in two dimensions over the picture. */
 function overlay(ink) {
