@@ -35,6 +35,8 @@ pub struct WithContacts<Y: Touching> {
     begins: Y::PerContact<bool>,
     /// Memory for the forces by which the direction of slip that begins is found.
     instant: Option<Touches<Y>>,
+    /// Whether it has forces found with the present modes, from which the next ones are searched.
+    near: bool,
     /// Whether any contact slides with friction.
     rubs: bool,
     /// Whether rows of closed contacts depend on one another.
@@ -81,6 +83,7 @@ impl<Y: Touching> WithContacts<Y> {
             slip: system.per_contact([zero; 2]),
             begins: system.per_contact(false),
             instant: Some(Touches::new(&system)),
+            near: false,
             rubs: false,
             redundant: false,
             at: Contacts {
@@ -141,6 +144,7 @@ impl<Y: Touching> WithContacts<Y> {
     }
 
     fn modes_are_set(&mut self) {
+        self.near = false;
         self.restore();
         self.rubs = (0..self.modes.as_ref().len()).any(|k| self.rubs(k));
     }
@@ -264,7 +268,8 @@ impl<Y: Touching> WithContacts<Y> {
                 instant.problem.as_mut()[i].slip = Some(self.direction(k));
             }
         }
-        if instant.find_forces(self, t, q, Effort::default()).is_ok() {
+        self.near = instant.find_forces(self, t, q, Effort::default(), self.near).is_ok();
+        if self.near {
             for i in 0..instant.count {
                 let k = instant.order()[i];
                 if self.begins.as_ref()[k] {
@@ -351,6 +356,7 @@ impl<Y: Touching> WithContacts<Y> {
     /// [`WithContacts::loads`] where contacts that slide share a load; `false` where no forces are found.
     fn share(&mut self, t: Y::Scalar, q: &Y::Coordinates) -> bool {
         let Some(mut instant) = self.instant.take() else { return false };
+        self.near = false; // Its forces are those of other lines.
         let found = instant.share(self, t, q);
         if found {
             let zero = Y::Scalar::zero();
