@@ -29,6 +29,8 @@ const UNSURE: f64 = 1e-3;
 pub struct WithContacts<Y: Touching> {
     pub(super) system: Y,
     modes: Y::PerContact<Mode>,
+    /// Whether rows of contacts act, by these modes or by those of a solve.
+    closed: bool,
     /// Direction of slip where the step began, for contacts that slide.
     pub(super) slip: Y::PerContact<[Y::Scalar; 2]>,
     /// Whether a contact begins to slide: its friction is against the acceleration of slip.
@@ -80,6 +82,7 @@ impl<Y: Touching> WithContacts<Y> {
         let count = system.contacts().len();
         WithContacts {
             modes,
+            closed: false,
             slip: system.per_contact([zero; 2]),
             begins: system.per_contact(false),
             instant: Some(Touches::new(&system)),
@@ -120,6 +123,11 @@ impl<Y: Touching> WithContacts<Y> {
         self.modes.as_ref()
     }
 
+    /// Whether all contacts are open.
+    pub(super) fn is_open(&self) -> bool {
+        self.modes().iter().all(|mode| *mode == Mode::Open)
+    }
+
     /// Forces of the contacts `[normal, tangential, tangential]`, N (N m for stops of rotations), at a state: on the second
     /// body, the opposite on the first.
     pub fn forces(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> &[[Y::Scalar; 3]] {
@@ -156,6 +164,7 @@ impl<Y: Touching> WithContacts<Y> {
 
     /// Lets rows act as `modes` say, for a solve; [`WithContacts::restore`] ends this.
     pub(super) fn borrow_modes(&mut self, modes: &[Mode]) {
+        self.closed = modes.iter().any(|mode| *mode != Mode::Open);
         self.system.act(modes);
     }
 
@@ -168,6 +177,7 @@ impl<Y: Touching> WithContacts<Y> {
 
     /// Lets rows act by the modes again.
     pub(super) fn restore(&mut self) {
+        self.closed = !self.is_open();
         self.system.act(self.modes.as_ref());
     }
 
@@ -498,6 +508,12 @@ impl<Y: Touching> Constrained for WithContacts<Y> {
 
     fn rows(&self) -> &[Row] {
         self.system.rows()
+    }
+
+    /// Rows of loops and couplings always act, those of contacts that are closed do.
+    fn rows_act(&self) -> bool {
+        let of_contacts: usize = self.system.contacts().iter().map(Contact::rows).sum();
+        self.closed || self.system.rows().len() > of_contacts
     }
 
     fn entry_columns(&self) -> &[usize] {
