@@ -367,11 +367,9 @@ impl<Y: Touching> WithContacts<Y> {
         let held = usize::from(!self.is_open());
         let none = Watched { turning: self.turning(k), ..Watched::zero() };
         match self.modes()[k] {
-            Mode::Open => Watched {
-                first: self.gap(k) + Y::Scalar::constant(OVERLAP[held]),
-                rate: self.gap_rate(k),
-                ..none
-            },
+            Mode::Open => {
+                Watched { first: self.gap(k) + Y::Scalar::constant(OVERLAP[held]), rate: self.gap_rate(k), ..none }
+            }
             Mode::Slide => {
                 let ([vx, vy], [a, b]) = (self.tangential(k), self.slip.as_ref()[k]);
                 let rubs = c.tangents && c.friction > zero;
