@@ -2,8 +2,11 @@
 
 use std::cell::Cell;
 use std::rc::Rc;
+use std::time::Instant;
 
+use mbd_codegen::jit::Compiled;
 use mbd_codegen::model::{JointKind, Model};
+use mbd_codegen::options::Options;
 use mbd_codegen::plan::Plan;
 use mbd_codegen::read;
 use mbd_runtime::catalogue::{self, BoxedMethod};
@@ -429,5 +432,39 @@ contact = [{ name = "c", between = ["floor", "skin"] }]
         };
         assert_eq!(contacts[0], contacts[1]);
         assert!((free - short).abs() < 1e-10, "{spin:?}: {free} {short}");
+    }
+}
+
+/// Least times of a motion in machine code with and without contacts, s, in turns.
+fn times((plan, q, v): &(Plan, Vec<f64>, Vec<f64>), time: f64, rounds: u32) -> [f64; 2] {
+    let step = Step::Adaptive(Tolerances::new(1e-9));
+    let mut free = Compiled::from_plan(plan.clone(), Options::default().of_model(true)).unwrap();
+    let mut p = v.clone();
+    free.conjugate_momenta(q, v, &mut p);
+    let mut system = WithContacts::new(plan.compiled_with_contacts::<f64>(&Options::default(), 10).unwrap());
+    let mut least = [f64::INFINITY; 2];
+    for _ in 0..rounds {
+        let clock = Instant::now();
+        let by: BoxedMethod<Compiled> = catalogue::explicit("verner9", &free, false).unwrap();
+        Solver::new(&mut free, by, step, 0.0, q, &p).unwrap().run(&mut free, time).unwrap();
+        least[0] = least[0].min(clock.elapsed().as_secs_f64());
+        let clock = Instant::now();
+        let by: BoxedMethod<WithContacts<ModeTable<Compiled>>> = catalogue::explicit("verner9", &system, false).unwrap();
+        let by = WithPostStep::new(&system, by, projection(&system));
+        let mut motion = Hybrid::new(&mut system, by, step, 0.0, q, &p).unwrap();
+        motion.run(&mut system, time, &mut ()).unwrap();
+        least[1] = least[1].min(clock.elapsed().as_secs_f64());
+        assert_eq!(motion.contact_statistics().events, 0);
+    }
+    least
+}
+
+/// `cargo test --release -p mbd-testing --test contacts times_of_far -- --ignored --nocapture`
+#[test]
+#[ignore = "times"]
+fn times_of_far_contacts() {
+    for (name, scene) in [("quadruped", quadruped()), ("monopod", monopod())] {
+        let [without, with] = times(&scene, 1.0, 500);
+        println!("{name}: {:.1} µs without contacts, {:.1} µs with: {:.3}", 1e6 * without, 1e6 * with, with / without);
     }
 }
