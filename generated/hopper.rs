@@ -83,8 +83,12 @@ impl Hopper {
     pub const ROW_LEG_LOWER: usize = 3;
     /// Index of the first row of constraint `leg/upper`.
     pub const ROW_LEG_UPPER: usize = 4;
-    /// Angle by which bodies turn per unit of each velocity, rad.
-    pub const TURNS: [f64; 2] = [0.0, 0.0];
+    /// How fast each velocity can close the gap of each contact, contact by contact.
+    pub const REACHES: [::multibody::runtime::contact::Reach<f64>; 6] = [
+        ::multibody::runtime::contact::Reach { rate: 1.0, turn: 0.0, slide: 0.0 }, ::multibody::runtime::contact::Reach { rate: 0.0, turn: 0.0, slide: 0.0 },
+        ::multibody::runtime::contact::Reach { rate: 0.0, turn: 0.0, slide: 0.0 }, ::multibody::runtime::contact::Reach { rate: 1.0, turn: 0.0, slide: 0.0 },
+        ::multibody::runtime::contact::Reach { rate: 0.0, turn: 0.0, slide: 0.0 }, ::multibody::runtime::contact::Reach { rate: 1.0, turn: 0.0, slide: 0.0 },
+    ];
     /// Names of the contacts.
     pub const CONTACTS: [&'static str; 3] = ["landing", "leg/lower", "leg/upper"];
     /// Sets of modes of the contacts that have functions of their own.
@@ -2111,8 +2115,8 @@ impl ::multibody::runtime::contact::Touching for Hopper {
     }
 
     #[inline]
-    fn turns(&self) -> &[f64] {
-        const { &Self::TURNS }
+    fn reaches(&self) -> &[::multibody::runtime::contact::Reach<f64>] {
+        const { &Self::REACHES }
     }
 
     #[inline]

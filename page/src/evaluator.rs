@@ -8,7 +8,7 @@ use multibody::codegen::options::{Arithmetic, Options};
 use multibody::codegen::plan::Plan;
 use multibody::codegen::wasm::{place, PlacedArray};
 use multibody::codegen::Output;
-use multibody::runtime::contact::{Reducible, Way};
+use multibody::runtime::contact::{Contact, Reach, Reducible, Way};
 use multibody::runtime::system::{LieJoint, Part, Row};
 use multibody::runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
 
@@ -298,8 +298,8 @@ impl Reducible for Evaluator {
             _ => Way::Interpreted,
         }
     }
-    fn turns(&self) -> Vec<f64> {
-        self.interpreter.tree().turns()
+    fn reaches(&self, contacts: &[Contact<f64>]) -> Vec<Reach<f64>> {
+        self.interpreter.tree().reaches(contacts)
     }
     fn gaps(
         &mut self,

@@ -350,6 +350,11 @@ pub trait Constrained: System {
     fn zero_entries(&self) -> Self::Entries;
     /// The rows.
     fn rows(&self) -> &[Row];
+    /// Whether any of the rows acts now. Where none does, momenta and positions are as [`Constrained::project_momenta`] and
+    /// [`Constrained::position_correction`] leave them.
+    fn rows_act(&self) -> bool {
+        !self.rows().is_empty()
+    }
     /// Velocity index of every entry of `Φ`.
     fn entry_columns(&self) -> &[usize];
     /// Residuals `φ(q)` of the positions (m, rad; zero for rows that are not holonomic) and the entries of `Φ(q)`.

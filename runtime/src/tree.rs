@@ -472,23 +472,6 @@ impl<S> Tree<S> {
     }
 }
 
-impl<S: crate::Real> Tree<S> {
-    /// Largest angle by which a body can turn against another one per unit of each velocity, rad: 1 for a rotation, 0 for
-    /// a translation, the sum of the ratios where joints follow.
-    pub fn turns(&self) -> Vec<S> {
-        let mut turns = alloc::vec![S::zero(); self.dims.nv];
-        for node in &self.nodes {
-            let Source::State { v, .. } = node.source else { continue };
-            for k in 0..node.kind.nv() {
-                if !matches!(node.kind.axis(k), Freedom::Unit(0..=2)) {
-                    turns[v + k] = turns[v + k] + node.ratio.abs();
-                }
-            }
-        }
-        turns
-    }
-}
-
 impl<S: Scalar> Tree<S> {
     /// The same mechanism with penalties in place of multipliers: momenta `σ = α (Φ v + ω φ)` with the weight `α` in kg
     /// (for rotations kg m²) and `ω` in 1/s. That is Bayo's method on the level of velocities, without the integral of

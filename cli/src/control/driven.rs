@@ -4,7 +4,7 @@ use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
 
 use multibody::codegen::jit::Compiled;
-use multibody::runtime::contact::{Reducible, Way};
+use multibody::runtime::contact::{Contact, Reach, Reducible, Way};
 use multibody::runtime::system::{LieJoint, Part, Row};
 use multibody::runtime::{Conjugate, Constrained, Differentiable, Energetic, StateDerivatives, System};
 
@@ -188,8 +188,8 @@ impl Reducible for Driven {
     fn way(&self) -> Way {
         self.inner.way()
     }
-    fn turns(&self) -> Vec<f64> {
-        self.inner.turns()
+    fn reaches(&self, contacts: &[Contact<f64>]) -> Vec<Reach<f64>> {
+        self.inner.reaches(contacts)
     }
     fn gaps(
         &mut self,

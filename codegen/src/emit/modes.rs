@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use mbd_runtime::contact::{work_len, Contact, Mode, RestitutionLaw};
+use mbd_runtime::contact::{work_len, Contact, Mode, Reach, RestitutionLaw};
 
 use super::numbers::literal;
 use super::signature::{nested, Signature};
@@ -102,15 +102,7 @@ impl<'a> Contacts<'a> {
     /// Constants: names of the contacts, sets of modes.
     pub fn constants(&self, out: &mut String, plan: &Plan) {
         let (rt, n) = (&self.options.runtime, self.contacts.len());
-        let turns = plan.tree(&plan.default_params()).turns();
-        let turns: Vec<String> = turns.into_iter().map(|x| literal(x, self.options.precision)).collect();
-        let _ = writeln!(
-            out,
-            "    /// Angle by which bodies turn per unit of each velocity, rad.\n    pub const TURNS: [{}; {}] = [{}];",
-            self.options.precision.name(),
-            turns.len(),
-            turns.join(", ")
-        );
+        self.reaches(out, plan);
         let _ = writeln!(
             out,
             "    /// Names of the contacts.\n    pub const CONTACTS: [&'static str; {n}] = {:?};",
@@ -129,6 +121,38 @@ impl<'a> Contacts<'a> {
         );
     }
 
+    /// How fast velocities can close gaps, a line for each contact.
+    fn reaches(&self, out: &mut String, plan: &Plan) {
+        let (rt, precision) = (&self.options.runtime, self.options.precision);
+        let number = |x: f64| match x.is_finite() {
+            true => literal(x, precision),
+            false => format!("{}::INFINITY", precision.name()),
+        };
+        let defaults = plan.default_params();
+        let mut reaches = plan.tree(&defaults).reaches(&self.contacts);
+        // What depends on parameters is not a number without them. It has no bound here.
+        let without = plan.tree(&vec![f64::NAN; defaults.len()]).reaches(&self.contacts);
+        for (row, without) in reaches.chunks_mut(plan.dims.nv.max(1)).zip(without.chunks(plan.dims.nv.max(1))) {
+            let known = without.iter().all(|x| (x.rate + x.turn + x.slide).is_finite());
+            row.iter_mut().filter(|_| !known).for_each(|x| x.rate = f64::INFINITY);
+        }
+        let _ = writeln!(
+            out,
+            "    /// How fast each velocity can close the gap of each contact, contact by contact.\n    \
+             pub const REACHES: [{rt}::contact::Reach<{}>; {}] = [",
+            precision.name(),
+            reaches.len()
+        );
+        for row in reaches.chunks(plan.dims.nv.max(1)) {
+            let entry = |x: &Reach<f64>| {
+                let [rate, turn, slide] = [x.rate, x.turn, x.slide].map(number);
+                format!("{rt}::contact::Reach {{ rate: {rate}, turn: {turn}, slide: {slide} }}")
+            };
+            let _ = writeln!(out, "        {},", row.iter().map(entry).collect::<Vec<_>>().join(", "));
+        }
+        let _ = writeln!(out, "    ];");
+    }
+
     /// `impl Touching`.
     pub fn touching(&self, out: &mut String, plan: &Plan) {
         let (rt, t, n) = (&self.options.runtime, self.options.precision.name(), self.contacts.len());
@@ -143,7 +167,7 @@ impl<'a> Contacts<'a> {
             method(&format!("contacts(&self) -> &[{rt}::contact::Contact<{t}>]"), "&self.contacts"),
             method(&format!("per_contact<{of}>(&self, value: T) -> [T; {n}]"), &format!("[value; {n}]")),
             method(&format!("zero_delassus(&self, _len: usize) -> {}", nested(&[room], t)), &nested(&[room], "0.0")),
-            method(&format!("turns(&self) -> &[{t}]"), "const { &Self::TURNS }"),
+            method(&format!("reaches(&self) -> &[{rt}::contact::Reach<{t}>]"), "const { &Self::REACHES }"),
             method(
                 &format!("way(&self) -> {rt}::contact::Way"),
                 &format!(

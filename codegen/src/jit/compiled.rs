@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use mbd_runtime::contact::{Reducible, Way};
+use mbd_runtime::contact::{Contact, Reach, Reducible, Way};
 use mbd_runtime::tree::row_order::RowProducts;
 use mbd_runtime::Interpreter;
 
@@ -374,8 +374,8 @@ impl<S: Number> Reducible for Compiled<S> {
         }
     }
 
-    fn turns(&self) -> Vec<S> {
-        self.interpreter.tree().turns()
+    fn reaches(&self, contacts: &[Contact<S>]) -> Vec<Reach<S>> {
+        self.interpreter.tree().reaches(contacts)
     }
 
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {

@@ -94,6 +94,9 @@ where
         q.as_mut().copy_from_slice(old.0.as_ref());
         p.as_mut().copy_from_slice(old.1.as_ref());
         post_step.close(system, t, remembers, q, p)?;
+        if old.0.as_ref() == q.as_ref() && old.1.as_ref() == p.as_ref() {
+            return Ok(());
+        }
         Chart::correct(system, (&old.0, &old.1), (q, p), point);
         Ok(())
     }
@@ -104,6 +107,9 @@ where
         if delta.parts() != self.delta.parts() {
             delta.copy_from(&self.delta);
             self.method.corrected();
+            if self.end_known {
+                self.method.know_end_rate(&self.end);
+            }
         }
         self.end_known = false;
     }
@@ -183,10 +189,15 @@ where
     }
 
     fn end_rate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> &Point<Y> {
-        if !self.end_known {
-            self.method.parts().0.rates(system, t + h, &self.delta, &mut self.end);
-            self.end_known = true;
+        if self.end_known {
+            return &self.end;
         }
+        // Where the end was not changed, the rate there is the method's own.
+        if self.method.parts().1.parts() == self.delta.parts() {
+            return self.method.end_rate(system, t, h);
+        }
+        self.method.parts().0.rates(system, t + h, &self.delta, &mut self.end);
+        self.end_known = true;
         &self.end
     }
 
@@ -211,6 +222,11 @@ where
 
     fn corrected(&mut self) {
         self.end_known = false;
+    }
+
+    fn know_end_rate(&mut self, rate: &Point<Y>) {
+        self.end.copy_from(rate);
+        self.end_known = true;
     }
 
     fn remembers(&self) -> bool {

@@ -286,6 +286,16 @@ where
         if !frees && !judged {
             return Ok(());
         }
+        if !system.rows_act() {
+            // Nothing to close: what follows would change nothing.
+            [&mut room.residual, &mut room.sigma, &mut room.pivots]
+                .into_iter()
+                .for_each(|rows| rows.as_mut().fill(Y::Scalar::zero()));
+            (self.corrector.found, self.corrector.rank) = (Y::Scalar::zero(), 0);
+            self.corrector.note(system, t, &room.pivots);
+            (self.corrector.reordered, self.gave_back) = (false, false);
+            return Ok(());
+        }
         self.p.as_mut().copy_from_slice(p.as_ref());
         system.project_momenta(t, q, &mut self.p, &mut room.v, &mut room.sigma);
         finite(self.p.as_ref())?;

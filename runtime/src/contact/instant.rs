@@ -1,7 +1,7 @@
 //! Impulses, or forces, of contacts at an instant: the problem and the memory for its solution.
 
 use super::assembly::{lines, symmetrize, Forces};
-use super::solver::eliminate;
+use super::solver::{eliminate, solve_near};
 use super::{
     solve, Certificate, Contact, ContactError, Effort, Mode, Problem, RestitutionLaw, Touch, Touching, WithContacts,
 };
@@ -150,17 +150,22 @@ impl<Y: Touching> Touches<Y> {
     }
 
     /// Forces of the contacts, in `impulses`, at the state that was looked at last: forces and accelerations are
-    /// complementary on the friction cones, and contacts with a direction of slip have their friction against it.
+    /// complementary on the friction cones, and contacts with a direction of slip have their friction against it. With
+    /// `near`, `impulses` has such forces of the same contacts at a state nearby.
     pub fn find_forces(
         &mut self,
         system: &mut WithContacts<Y>,
         t: Y::Scalar,
         q: &Y::Coordinates,
         effort: Effort,
+        near: bool,
     ) -> Result<Certificate<Y::Scalar>, ContactError> {
         self.assemble(system, t, q);
         self.free_accelerations(system, t, q);
         let (problem, forces, work) = self.parts();
+        if near {
+            return solve_near(&problem, effort, forces, work);
+        }
         forces.fill(Y::Scalar::zero());
         solve(&problem, effort, forces, work)
     }

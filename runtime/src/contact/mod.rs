@@ -10,6 +10,8 @@ mod instant;
 #[cfg(feature = "alloc")]
 mod mode_table;
 mod motion;
+#[cfg(feature = "alloc")]
+mod reach;
 mod solver;
 mod stepping;
 mod touching;
@@ -26,7 +28,7 @@ pub use solver::{
     impact, solve, work_len, Certificate, ContactError, Effort, Impact, ImpactOptions, ImpactOrder, Problem, Touch,
 };
 pub use stepping::{LastTimeStep, SteppingStatistics, TimeStepping};
-pub use touching::Touching;
+pub use touching::{Reach, Touching};
 pub use with_contacts::WithContacts;
 
 /// How a contact with restitution throws its bodies apart.

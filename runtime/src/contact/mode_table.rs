@@ -4,7 +4,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::{Deref, DerefMut};
 
-use super::{rows_that_act, Contact, Mode, Touching, Way};
+use super::{rows_that_act, Contact, Mode, Reach, Touching, Way};
 use crate::interp::Interpreter;
 use crate::system::{system_within, Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
 use crate::Scalar;
@@ -21,8 +21,8 @@ pub trait Reducible: Constrained<Scalar: Real> + Energetic + Conjugate + Sized {
     /// What computes its rates.
     fn way(&self) -> Way;
 
-    /// [`Touching::turns`].
-    fn turns(&self) -> Vec<Self::Scalar>;
+    /// [`Touching::reaches`].
+    fn reaches(&self, contacts: &[Contact<Self::Scalar>]) -> Vec<Reach<Self::Scalar>>;
 
     /// Residuals of all rows, their velocities and the entries of `Φ`: [`Touching::gaps`].
     fn gaps(
@@ -48,8 +48,8 @@ impl<S: Real> Reducible for Interpreter<S> {
         Way::Interpreted
     }
 
-    fn turns(&self) -> Vec<S> {
-        self.tree().turns()
+    fn reaches(&self, contacts: &[Contact<S>]) -> Vec<Reach<S>> {
+        self.tree().reaches(contacts)
     }
 
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
@@ -67,7 +67,7 @@ pub struct ModeTable<Y: System> {
     modes: Vec<(Vec<Mode>, Y)>,
     current: usize,
     contacts: Vec<Contact<Y::Scalar>>,
-    turns: Vec<Y::Scalar>,
+    reaches: Vec<Reach<Y::Scalar>>,
 }
 
 /// A mechanism with contacts in the interpreter.
@@ -78,8 +78,8 @@ impl<Y: Reducible> ModeTable<Y> {
     pub fn new(full: Y, contacts: Vec<Contact<Y::Scalar>>) -> Self {
         let open = vec![Mode::Open; contacts.len()];
         let first = full.acting(&rows_that_act(full.rows().len(), &contacts, &open));
-        let turns = full.turns();
-        ModeTable { full, modes: vec![(open, first)], current: 0, contacts, turns }
+        let reaches = full.reaches(&contacts);
+        ModeTable { full, modes: vec![(open, first)], current: 0, contacts, reaches }
     }
 
     /// The sets of modes that were met, in the order in which they were.
@@ -212,8 +212,8 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
         Reducible::way(&**self)
     }
 
-    fn turns(&self) -> &[Y::Scalar] {
-        &self.turns
+    fn reaches(&self) -> &[Reach<Y::Scalar>] {
+        &self.reaches
     }
 
     fn act(&mut self, modes: &[Mode]) {

@@ -5,6 +5,21 @@ use crate::constrained::rows::row;
 use crate::system::{Constrained, Real};
 use crate::Scalar;
 
+/// How fast a velocity can close the gap of a contact.
+///
+/// The gap changes by `Σ (rate + turn · Σ slide |q|) |v|` in a second at most, with the sums over the velocities and, inside, over
+/// the coordinates that belong to them. That holds in body axes and in outer ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reach<S> {
+    /// Rate of the gap per unit of the velocity where no translation lengthens an arm, m (rad for stops of rotations).
+    /// Infinite where prescribed motions move the bodies.
+    pub rate: S,
+    /// Angle by which bodies turn per unit of the velocity, rad.
+    pub turn: S,
+    /// Length that a unit of the coordinate adds to the arms of rotations, m.
+    pub slide: S,
+}
+
 /// A mechanism with contacts. Its rows are those of loops and couplings, which always act, and those of the contacts, which
 /// act by their modes; rows that do not act have no residuals, entries and multipliers in [`Constrained`].
 ///
@@ -22,9 +37,9 @@ pub trait Touching: Constrained<Scalar: Real> {
     fn per_contact<T: Copy + core::fmt::Debug>(&self, value: T) -> Self::PerContact<T>;
     /// Memory for the inverse inertia of the contacts: at least `len` zeros, where `len` is what the solver asks for.
     fn zero_delassus(&self, len: usize) -> Self::Delassus;
-    /// Largest angle by which a body can turn against another one per unit of each velocity, rad; zero for translations.
-    /// Steps in which bodies turn far are searched for contacts at more points.
-    fn turns(&self) -> &[Self::Scalar];
+    /// How fast each velocity can close the gap of each contact, `nv` entries for each contact. What cannot have come together
+    /// in a step is not looked at.
+    fn reaches(&self) -> &[Reach<Self::Scalar>];
     /// What computes the rates in the modes that were set last.
     fn way(&self) -> Way;
     /// Sets the modes, one for each contact, by which rows act from now on.

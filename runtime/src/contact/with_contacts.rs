@@ -29,12 +29,16 @@ const UNSURE: f64 = 1e-3;
 pub struct WithContacts<Y: Touching> {
     pub(super) system: Y,
     modes: Y::PerContact<Mode>,
+    /// Whether rows of contacts act, by these modes or by those of a solve.
+    closed: bool,
     /// Direction of slip where the step began, for contacts that slide.
     pub(super) slip: Y::PerContact<[Y::Scalar; 2]>,
     /// Whether a contact begins to slide: its friction is against the acceleration of slip.
     begins: Y::PerContact<bool>,
     /// Memory for the forces by which the direction of slip that begins is found.
     instant: Option<Touches<Y>>,
+    /// Whether it has forces found with the present modes, from which the next ones are searched.
+    near: bool,
     /// Whether any contact slides with friction.
     rubs: bool,
     /// Whether rows of closed contacts depend on one another.
@@ -78,9 +82,11 @@ impl<Y: Touching> WithContacts<Y> {
         let count = system.contacts().len();
         WithContacts {
             modes,
+            closed: false,
             slip: system.per_contact([zero; 2]),
             begins: system.per_contact(false),
             instant: Some(Touches::new(&system)),
+            near: false,
             rubs: false,
             redundant: false,
             at: Contacts {
@@ -117,6 +123,11 @@ impl<Y: Touching> WithContacts<Y> {
         self.modes.as_ref()
     }
 
+    /// Whether all contacts are open.
+    pub(super) fn is_open(&self) -> bool {
+        self.modes().iter().all(|mode| *mode == Mode::Open)
+    }
+
     /// Forces of the contacts `[normal, tangential, tangential]`, N (N m for stops of rotations), at a state: on the second
     /// body, the opposite on the first.
     pub fn forces(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> &[[Y::Scalar; 3]] {
@@ -141,6 +152,7 @@ impl<Y: Touching> WithContacts<Y> {
     }
 
     fn modes_are_set(&mut self) {
+        self.near = false;
         self.restore();
         self.rubs = (0..self.modes.as_ref().len()).any(|k| self.rubs(k));
     }
@@ -152,6 +164,7 @@ impl<Y: Touching> WithContacts<Y> {
 
     /// Lets rows act as `modes` say, for a solve; [`WithContacts::restore`] ends this.
     pub(super) fn borrow_modes(&mut self, modes: &[Mode]) {
+        self.closed = modes.iter().any(|mode| *mode != Mode::Open);
         self.system.act(modes);
     }
 
@@ -164,6 +177,7 @@ impl<Y: Touching> WithContacts<Y> {
 
     /// Lets rows act by the modes again.
     pub(super) fn restore(&mut self) {
+        self.closed = !self.is_open();
         self.system.act(self.modes.as_ref());
     }
 
@@ -264,7 +278,8 @@ impl<Y: Touching> WithContacts<Y> {
                 instant.problem.as_mut()[i].slip = Some(self.direction(k));
             }
         }
-        if instant.find_forces(self, t, q, Effort::default()).is_ok() {
+        self.near = instant.find_forces(self, t, q, Effort::default(), self.near).is_ok();
+        if self.near {
             for i in 0..instant.count {
                 let k = instant.order()[i];
                 if self.begins.as_ref()[k] {
@@ -351,6 +366,7 @@ impl<Y: Touching> WithContacts<Y> {
     /// [`WithContacts::loads`] where contacts that slide share a load; `false` where no forces are found.
     fn share(&mut self, t: Y::Scalar, q: &Y::Coordinates) -> bool {
         let Some(mut instant) = self.instant.take() else { return false };
+        self.near = false; // Its forces are those of other lines.
         let found = instant.share(self, t, q);
         if found {
             let zero = Y::Scalar::zero();
@@ -492,6 +508,12 @@ impl<Y: Touching> Constrained for WithContacts<Y> {
 
     fn rows(&self) -> &[Row] {
         self.system.rows()
+    }
+
+    /// Rows of loops and couplings always act, those of contacts that are closed do.
+    fn rows_act(&self) -> bool {
+        let of_contacts: usize = self.system.contacts().iter().map(Contact::rows).sum();
+        self.closed || self.system.rows().len() > of_contacts
     }
 
     fn entry_columns(&self) -> &[usize] {

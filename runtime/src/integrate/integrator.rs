@@ -303,6 +303,11 @@ where
         self.step.end_known = false;
     }
 
+    fn know_end_rate(&mut self, rate: &Point<Y>) {
+        self.step.end.copy_from(rate);
+        self.step.end_known = true;
+    }
+
     fn remembers(&self) -> bool {
         S::MULTISTEP
     }

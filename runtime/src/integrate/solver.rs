@@ -285,6 +285,31 @@ where
         (self.t, self.pending.map_or(Y::Scalar::zero(), |step| step.h))
     }
 
+    /// Bounds of how far each coordinate has come from where the last step began, at any time within it: twice what its mean
+    /// rate gives in the step, and twice what its rates at the start and end give, where these are asked for. With them the
+    /// absolute values of the coordinates where the step began; zero for rotations.
+    ///
+    /// These rates are what the method needs anyway, but for methods that do not start the next step with the rate at the
+    /// end of this one.
+    pub(crate) fn travel(&mut self, system: &mut Y, rates: [bool; 2]) -> [&mut Y::Momenta; 2] {
+        let (two, (t, h)) = (Y::Scalar::constant(2.0), self.last_step());
+        let Solver { method, at, size, .. } = self;
+        let (field, delta) = method.parts();
+        field.chart().size(system, size);
+        let further = |x: &mut Y::Scalar, way: Y::Scalar| *x = if way.abs() <= *x { *x } else { way.abs() };
+        at.x.as_mut().iter_mut().zip(delta.x.as_ref()).for_each(|(x, delta)| *x = (two * *delta).abs());
+        let mut reach = |rate: &Point<Y>| {
+            at.x.as_mut().iter_mut().zip(rate.x.as_ref()).for_each(|(x, rate)| further(x, two * h * *rate));
+        };
+        if rates[0] {
+            reach(method.start_rate(system, t));
+        }
+        if rates[1] {
+            reach(method.end_rate(system, t, h));
+        }
+        [&mut at.x, &mut size.x]
+    }
+
     /// Accepts the pending step.
     fn project_momenta(&mut self, system: &mut Y) -> Result<(), StepError> {
         if let Some(step) = self.pending {

@@ -114,6 +114,10 @@ where
     /// evaluated before is no longer valid.
     fn corrected(&mut self) {}
 
+    /// Tells the method the rate at the end of the last attempt, in the coordinates of its start, where the caller has
+    /// changed the displacement and has evaluated the rate there.
+    fn know_end_rate(&mut self, _rate: &Point<Y>) {}
+
     /// Whether rates of past steps are used. Momenta must not jump then, not even along a gauge direction, which
     /// changes nothing in the motion.
     fn remembers(&self) -> bool {
@@ -213,6 +217,10 @@ where
 
     fn corrected(&mut self) {
         (**self).corrected()
+    }
+
+    fn know_end_rate(&mut self, rate: &Point<Y>) {
+        (**self).know_end_rate(rate)
     }
 
     fn remembers(&self) -> bool {

@@ -2,6 +2,7 @@
 
 mod answers;
 mod edges;
+mod far;
 mod known;
 mod models;
 mod round;

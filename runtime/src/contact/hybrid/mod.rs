@@ -1,5 +1,6 @@
 //! Motion with contacts: steps of any method between events, and what happens at the events.
 
+mod apart;
 mod land;
 mod resolve;
 mod saltation;
@@ -251,7 +252,8 @@ struct Departure<S> {
 /// Between events, the mechanism moves with the contacts that are closed as constraints. Within each step, gaps, normal
 /// forces, friction cones and speeds of slip are watched on the dense output; where one of them reaches zero, the step is
 /// cut there, impulses and modes are computed, and the motion starts again. A gap counts as zero where it touches zero
-/// within a step too, which its rate tells.
+/// within a step too, which its rate tells. While all contacts are open, gaps are not looked at before the joints have
+/// moved so far that one of them may have closed ([`Touching::reaches`]).
 #[derive(Clone, Debug)]
 pub struct Hybrid<Y: Touching, M> {
     solver: Solver<WithContacts<Y>, M>,
@@ -265,8 +267,11 @@ pub struct Hybrid<Y: Touching, M> {
     right: Y::PerContact<Watched<Y::Scalar>>,
     /// Those at the end of the step.
     end: Y::PerContact<Watched<Y::Scalar>>,
-    /// Angular velocities at these ends, rad/s: the sum of those of all joints.
-    turning: [Y::Scalar; 2],
+    /// Whether the left end is where the next step starts.
+    known: bool,
+    /// What is left of each gap after the travel since it was looked at last, m (rad); travel in the last step.
+    reserve: Y::PerContact<Y::Scalar>,
+    travel: Y::PerContact<Y::Scalar>,
     departures: Y::PerContact<Departure<Y::Scalar>>,
     touching: Touches<Y>,
     /// Contacts that are left open whatever their gaps are.
@@ -335,7 +340,9 @@ where
             left: inner.per_contact(Watched::zero()),
             right: inner.per_contact(Watched::zero()),
             end: inner.per_contact(Watched::zero()),
-            turning: [zero; 2],
+            known: false,
+            reserve: inner.per_contact(zero),
+            travel: inner.per_contact(zero),
             departures: inner.per_contact(departure),
             touching: Touches::new(inner),
             ignored: inner.per_contact(false),

@@ -88,6 +88,7 @@ where
             return Err(HybridError::NotFinite { time: t.to_f64() });
         }
         self.evaluate(system, t, false);
+        self.refill();
         // Slip that begins has the direction of its acceleration while it is slow: the first step ends before it is not.
         let creeps = CREEP / self.slipping.to_f64();
         self.solver.limits.first_step = if creeps < LONGEST { creeps } else { 0.0 };

@@ -32,7 +32,7 @@ where
         self.set_slips(system);
         let Hybrid { touching, q, rules, .. } = self;
         touching
-            .find_forces(system, t, q, rules.effort)
+            .find_forces(system, t, q, rules.effort, false)
             .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
         self.read_modes();
         Ok(())

@@ -12,7 +12,7 @@ const STRETCHES: u32 = 4;
 /// Largest number of stretches, and largest angle, rad, by which bodies turn within one: steps in which bodies spin freely
 /// may be many turns long, because no error limits them.
 const MOST_STRETCHES: f64 = 1e6;
-const TURN: f64 = 1.0;
+pub(super) const TURN: f64 = 1.0;
 /// Speed of slip, m/s, below which bodies that slide ever more slowly may come to rest.
 const STANDSTILL: f64 = 1e-10;
 /// How often a stretch is halved in search of a point where a gap is positive, and another function.
@@ -32,6 +32,8 @@ pub(super) struct Watched<S> {
     pub rate: S,
     /// Speed of slip of a contact that slides.
     pub speed: S,
+    /// Angular velocity of its bodies against each other, rad/s, at most.
+    pub turning: S,
     /// Speed of slip along the direction where the step began; distance of the force from the friction cone.
     pub second: Option<S>,
 }
@@ -56,11 +58,12 @@ fn causes(mode: Mode) -> [Cause; 2] {
 
 impl<S: Real> Watched<S> {
     pub(super) fn zero() -> Self {
-        Watched { first: S::zero(), rate: S::zero(), speed: S::zero(), second: None }
+        let zero = S::zero();
+        Watched { first: zero, rate: zero, speed: zero, turning: zero, second: None }
     }
 
     /// Whether the gap cannot have closed in the `h` s between here and a later point, with twice the speeds at both.
-    fn apart(&self, later: &Self, h: S) -> bool {
+    pub(super) fn apart(&self, later: &Self, h: S) -> bool {
         let least = if self.first < later.first { self.first } else { later.first };
         let fastest = if self.rate.abs() > later.rate.abs() { self.rate.abs() } else { later.rate.abs() };
         least > S::constant(2.0) * h * fastest
@@ -83,11 +86,9 @@ where
     /// Evaluates the functions at the state in `self.q`, `self.p`.
     pub(super) fn evaluate(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, right: bool) {
         system.look(t, &self.q, &self.p);
-        let closed = system.modes().iter().any(|mode| *mode != Mode::Open);
-        if closed {
+        if !system.is_open() {
             system.loads(t, &self.q, true);
         }
-        self.turning[usize::from(right)] = system.turning();
         let out = if right { &mut self.right } else { &mut self.left };
         for (k, out) in out.as_mut().iter_mut().enumerate() {
             *out = system.watched(k);
@@ -127,21 +128,31 @@ where
         if self.left.as_ref().is_empty() {
             return Ok(None);
         }
-        self.sample(system, one, true);
-        self.rests = system.at_rest();
-        let (_, h) = self.solver.last_step();
-        let fastest = self.turning[0].to_f64().max(self.turning[1].to_f64());
-        let turn = h.to_f64().abs() * fastest / TURN;
-        if turn < 1.0 && system.modes().iter().all(|mode| *mode == Mode::Open) && self.apart(h) {
-            self.move_on();
+        let known = core::mem::replace(&mut self.known, false);
+        if self.stays_apart(system) {
+            self.rests = false;
             return Ok(None);
         }
-        if !(turn < MOST_STRETCHES) {
-            return Err(HybridError::TurnsTooFar { time: self.solver.last_step().0.to_f64(), angle: turn * TURN });
-        }
+        self.sample(system, one, true);
+        self.rests = system.at_rest();
         // The last stretch ends there too.
-        let (end, last_turning) = (self.end.as_mut(), self.turning[1]);
-        end.copy_from_slice(self.right.as_ref());
+        self.end.as_mut().copy_from_slice(self.right.as_ref());
+        self.travel_with_end(system);
+        let (t, h) = self.solver.last_step();
+        if !known && !(0..self.count(system)).all(|k| self.is_far(k)) {
+            let Hybrid { start, q, p, .. } = self;
+            q.as_mut().copy_from_slice(start.1.as_ref());
+            p.as_mut().copy_from_slice(start.2.as_ref());
+            self.evaluate(system, t, false);
+        }
+        let Some(turn) = self.turn_of_near(system, h) else {
+            self.move_on();
+            self.refill();
+            return Ok(None);
+        };
+        if !(turn < MOST_STRETCHES) {
+            return Err(HybridError::TurnsTooFar { time: t.to_f64(), angle: turn * TURN });
+        }
         let stretches = libm::ceil(turn).max(f64::from(STRETCHES)) as u32;
         let mut from = zero;
         for j in 1..=stretches {
@@ -150,7 +161,6 @@ where
                 self.sample(system, to, true);
             } else {
                 self.right.as_mut().copy_from_slice(self.end.as_ref());
-                self.turning[1] = last_turning;
             }
             let mut first: Option<Found<Y::Scalar>> = None;
             for k in 0..self.left.as_ref().len() {
@@ -168,6 +178,7 @@ where
             self.move_on();
             from = to;
         }
+        self.refill();
         match self.creeps(system) {
             Some(contact) => Ok(Some(Found { contact, cause: Cause::Stopped, theta: one })),
             None => self.overloaded(system),
@@ -235,12 +246,6 @@ where
     /// Takes the end of a stretch for the start of the next one.
     fn move_on(&mut self) {
         core::mem::swap(&mut self.left, &mut self.right);
-        self.turning[0] = self.turning[1];
-    }
-
-    /// Whether no gap can have closed within a step of `h` s.
-    fn apart(&self, h: Y::Scalar) -> bool {
-        self.left.as_ref().iter().zip(self.right.as_ref()).all(|(a, b)| a.apart(b, h))
     }
 
     /// The first zero of a function between two points of the step, at whose ends `self.left` and `self.right` are.
@@ -255,7 +260,7 @@ where
         let (a, b) = (self.left.as_ref()[k], self.right.as_ref()[k]);
         let (at_a, at_b) = (a.value(which)?, b.value(which)?);
         let mode = system.modes()[k];
-        if mode == Mode::Open && self.ignored.as_ref()[k] {
+        if mode == Mode::Open && self.is_far(k) {
             return None;
         }
         if system.redundant && !system.shares() && mode != Mode::Open && !(mode == Mode::Slide && which == 1) {
@@ -354,32 +359,25 @@ impl<Y: Touching> WithContacts<Y> {
         self.at.v.as_ref().iter().all(|v| v.to_f64().abs() < 1e-12)
     }
 
-    /// Largest angular velocity between bodies that the velocities allow, rad/s, after [`WithContacts::look`].
-    fn turning(&self) -> Y::Scalar {
-        let turns = self.system().turns().iter().zip(self.at.v.as_ref());
-        turns.fold(Y::Scalar::zero(), |sum, (turn, v)| sum + *turn * v.abs())
-    }
-
     /// The functions of contact `k`, after [`WithContacts::look`] and, if it is closed, [`WithContacts::loads`].
     pub(super) fn watched(&self, k: usize) -> Watched<Y::Scalar> {
         let zero = Y::Scalar::zero();
         let c = self.contact(k);
         let [normal, x, y] = self.at.forces.as_ref()[k];
-        let held = usize::from(self.modes().iter().any(|mode| *mode != Mode::Open));
+        let held = usize::from(!self.is_open());
+        let none = Watched { turning: self.turning(k), ..Watched::zero() };
         match self.modes()[k] {
-            Mode::Open => Watched {
-                first: self.gap(k) + Y::Scalar::constant(OVERLAP[held]),
-                rate: self.gap_rate(k),
-                ..Watched::zero()
-            },
+            Mode::Open => {
+                Watched { first: self.gap(k) + Y::Scalar::constant(OVERLAP[held]), rate: self.gap_rate(k), ..none }
+            }
             Mode::Slide => {
                 let ([vx, vy], [a, b]) = (self.tangential(k), self.slip.as_ref()[k]);
                 let rubs = c.tangents && c.friction > zero;
-                Watched { first: normal, rate: zero, speed: self.speed(k), second: rubs.then_some(vx * a + vy * b) }
+                Watched { first: normal, speed: self.speed(k), second: rubs.then_some(vx * a + vy * b), ..none }
             }
             Mode::Stick => {
                 let tangential = (x * x + y * y).sqrt();
-                Watched { first: normal, second: Some(c.friction * normal - tangential), ..Watched::zero() }
+                Watched { first: normal, second: Some(c.friction * normal - tangential), ..none }
             }
         }
     }

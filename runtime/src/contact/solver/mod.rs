@@ -145,6 +145,8 @@ pub const fn work_len(rows: usize) -> usize {
 const SWEEPS: u32 = 5;
 /// Steps of Newton's method in a round.
 const STEPS: u32 = 8;
+/// Steps of Newton's method from the solution of a problem nearby.
+const NEAR: u32 = 4;
 
 /// Computes the impulses of a problem; `impulses` has a number for each row, the start of the iteration and its result,
 /// and `work` [`work_len`] numbers.
@@ -165,6 +167,36 @@ pub fn solve<S: Real>(
     let (least, work) = work.split_at_mut(rows);
     least.fill(S::zero());
     solve_above(problem, least, effort, impulses, work)
+}
+
+/// [`solve`] from impulses that solve a problem nearby: where these or steps of Newton's method reach the tolerance, no
+/// sweep is made. Elsewhere, the iteration starts from zero.
+///
+/// A contact that friction wedges is found by sweeps only, so that it must have been looked for before.
+///
+/// # Errors
+/// [`ContactError`].
+pub(super) fn solve_near<S: Real>(
+    problem: &Problem<S>,
+    effort: Effort,
+    impulses: &mut [S],
+    work: &mut [S],
+) -> Result<Certificate<S>, ContactError> {
+    if let Effort::ToTolerance { tolerance, .. } = effort {
+        let (least, rest) = work.split_at_mut(problem.b.len());
+        least.fill(S::zero());
+        let terms = Terms { problem, least, alpha: S::zero(), anchor: &[] };
+        let (_, residual) = cone::residual(&terms, impulses);
+        let mut progress = Progress { worst: (0, residual), sweeps: 0, newton: 0 };
+        let tolerance = tolerance.max(16.0 * S::epsilon());
+        if residual.to_f64() <= tolerance || improve(&terms, tolerance, NEAR, impulses, &mut progress, rest) {
+            let Progress { worst, sweeps, newton } = progress;
+            differentiate(&terms, impulses, rest)?;
+            return Ok(Certificate { residual: worst.1, sweeps, newton });
+        }
+    }
+    impulses.fill(S::zero());
+    solve(problem, effort, impulses, work)
 }
 
 /// A problem as the iterations see it.
@@ -217,13 +249,16 @@ fn solve_above<S: Real>(
     work: &mut [S],
 ) -> Result<Certificate<S>, ContactError> {
     let certificate = iterate(problem, least, effort, impulses, work)?;
-    if S::zero().derivative().is_some() {
-        let terms = Terms { problem, least, alpha: S::zero(), anchor: &[] };
-        if !newton::differentiate(&terms, impulses, work) {
-            return Err(ContactError::NotFinite);
-        }
-    }
+    differentiate(&Terms { problem, least, alpha: S::zero(), anchor: &[] }, impulses, work)?;
     Ok(certificate)
+}
+
+/// Gives the solution its derivatives, on numbers that have any.
+fn differentiate<S: Real>(terms: &Terms<S>, impulses: &mut [S], work: &mut [S]) -> Result<(), ContactError> {
+    if S::zero().derivative().is_some() && !newton::differentiate(terms, impulses, work) {
+        return Err(ContactError::NotFinite);
+    }
+    Ok(())
 }
 
 /// The impulses of [`solve_above`] by iteration.
@@ -302,18 +337,33 @@ fn approach<S: Real>(
                 return Ok(true);
             }
         }
-        for _ in 0..STEPS {
-            if !newton::step(terms, impulses, progress.worst.1, work) {
-                break;
-            }
-            progress.newton += 1;
-            progress.worst = cone::residual(terms, impulses);
-            if progress.worst.1.to_f64() <= tolerance {
-                return Ok(true);
-            }
+        if improve(terms, tolerance, STEPS, impulses, progress, work) {
+            return Ok(true);
         }
     }
     Ok(false)
+}
+
+/// Steps of Newton's method, until the residual is below a tolerance or a step does not reduce it; whether it is below.
+fn improve<S: Real>(
+    terms: &Terms<S>,
+    tolerance: f64,
+    steps: u32,
+    impulses: &mut [S],
+    progress: &mut Progress<S>,
+    work: &mut [S],
+) -> bool {
+    for _ in 0..steps {
+        if !newton::step(terms, impulses, progress.worst.1, work) {
+            return false;
+        }
+        progress.newton += 1;
+        progress.worst = cone::residual(terms, impulses);
+        if progress.worst.1.to_f64() <= tolerance {
+            return true;
+        }
+    }
+    false
 }
 
 /// Solves every contact by itself, one after the other.

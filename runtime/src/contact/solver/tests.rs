@@ -6,7 +6,8 @@ use std::vec;
 use std::vec::Vec;
 
 use super::{
-    energy, impact, solve, velocity, work_len, ContactError, Effort, Impact, ImpactOptions, ImpactOrder, Problem, Touch,
+    energy, impact, solve, solve_near, velocity, work_len, ContactError, Effort, Impact, ImpactOptions, ImpactOrder,
+    Problem, Touch,
 };
 use crate::contact::{Contact, RestitutionLaw};
 use crate::Dual;
@@ -420,4 +421,39 @@ fn derivatives_of_impulses_are_those_of_differences() {
         }
     }
     assert!(compared > 550 && kinks < 10, "{compared} {kinks}");
+}
+
+/// Warm starts: the forces of a problem nearby need no sweep, and forces that are far from any solution do no harm.
+#[test]
+fn a_problem_nearby_needs_fewer_sweeps() {
+    let mut r = Random(5);
+    let (mut swept, mut warm) = (0, 0);
+    for _ in 0..200 {
+        let (mut case, _) = random(&mut r, 3, 3, 3.0, 0.8, 0.0);
+        let rows = case.b.len();
+        let (mut work, mut near) = (vec![0.0; work_len(rows)], vec![0.0; rows]);
+        let effort = Effort::default();
+        if solve(&case.problem(), effort, &mut near, &mut work).is_err() {
+            continue;
+        }
+        case.b.iter_mut().for_each(|b| *b *= 1.0 + 1e-4 * r.between(-1.0, 1.0));
+        let mut cold = vec![0.0; rows];
+        let mut far: Vec<f64> = (0..rows).map(|_| r.between(-1e3, 1e3)).collect();
+        let [a, b, c] = [
+            solve(&case.problem(), effort, &mut cold, &mut work).unwrap(),
+            solve_near(&case.problem(), effort, &mut near, &mut work).unwrap(),
+            solve_near(&case.problem(), effort, &mut far, &mut work).unwrap(),
+        ];
+        assert!(b.residual <= 1e-11 && c.residual <= 1e-11, "{b:?} {c:?}");
+        let velocities = |x: &[f64]| (0..rows).map(|row| velocity(&case.problem(), row, x)).collect::<Vec<_>>();
+        let size = case.b.iter().fold(0.0_f64, |most, b| most.max(b.abs()));
+        for other in [&near, &far] {
+            for (x, y) in velocities(&cold).iter().zip(velocities(other)) {
+                assert!((x - y).abs() < 1e-8 * size, "{x} {y}");
+            }
+        }
+        swept += a.sweeps;
+        warm += b.sweeps;
+    }
+    assert!(10 * warm < swept, "{warm} sweeps against {swept}");
 }

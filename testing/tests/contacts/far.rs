@@ -1,0 +1,470 @@
+//! Contacts that are far away: bounds of how fast gaps close, and what it costs to watch them.
+
+use std::cell::Cell;
+use std::rc::Rc;
+use std::time::Instant;
+
+use mbd_codegen::jit::Compiled;
+use mbd_codegen::model::{JointKind, Model};
+use mbd_codegen::options::Options;
+use mbd_codegen::plan::Plan;
+use mbd_codegen::read;
+use mbd_runtime::catalogue::{self, BoxedMethod};
+use mbd_runtime::constrained::{close, Closing, Effort, Projection, Stabilisation, WithPostStep};
+use mbd_runtime::contact::{
+    Contact, ContactEvent, ContactObserver, Hybrid, ModeTable, Reach, Reducible, Touching, Way, WithContacts,
+};
+use mbd_runtime::integrate::{Solver, Step, Tolerances, Verner9};
+use mbd_runtime::system::{LieJoint, Row};
+use mbd_runtime::tree::Source;
+use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
+use mbd_testing::random::{random_model, Distribution, Rng};
+use mbd_testing::state::random_state;
+use mbd_testing::toml::to_toml;
+
+use super::scene::{model, Scene};
+
+/// A mechanism that counts the sweeps over it.
+#[derive(Clone, Debug)]
+struct Counted {
+    inner: Interpreter<f64>,
+    sweeps: Rc<Cell<u64>>,
+    /// Whether nothing is said of how fast gaps close.
+    silent: bool,
+}
+
+impl Counted {
+    fn new(inner: Interpreter<f64>) -> Self {
+        Counted { inner, sweeps: Rc::new(Cell::new(0)), silent: false }
+    }
+
+    fn counted(&mut self) -> &mut Interpreter<f64> {
+        self.sweeps.set(self.sweeps.get() + 1);
+        &mut self.inner
+    }
+}
+
+impl System for Counted {
+    type Scalar = f64;
+    type Coordinates = Vec<f64>;
+    type Momenta = Vec<f64>;
+
+    fn neutral(&self) -> Vec<f64> {
+        self.inner.neutral()
+    }
+    fn zero_momenta(&self) -> Vec<f64> {
+        self.inner.zero_momenta()
+    }
+    fn lie_joints(&self) -> &[LieJoint] {
+        self.inner.lie_joints()
+    }
+    fn rates_at(&mut self, t: f64, q: &Vec<f64>, p: &Vec<f64>, qd: &mut Vec<f64>, pd: &mut Vec<f64>) {
+        self.counted().rates_at(t, q, p, qd, pd);
+    }
+    fn coordinate_rates(&self, q: &Vec<f64>, v: &Vec<f64>, qd: &mut Vec<f64>) {
+        self.inner.coordinate_rates(q, v, qd);
+    }
+}
+
+impl Energetic for Counted {
+    fn energies(&mut self, q: &Vec<f64>, p: &Vec<f64>) -> (f64, f64) {
+        self.inner.energies(q, p)
+    }
+}
+
+impl Conjugate for Counted {
+    fn conjugate_momenta(&mut self, q: &Vec<f64>, v: &Vec<f64>, p: &mut Vec<f64>) {
+        self.inner.conjugate_momenta(q, v, p);
+    }
+}
+
+impl Constrained for Counted {
+    type Rows = Vec<f64>;
+    type Entries = Vec<f64>;
+
+    fn zero_rows(&self) -> Vec<f64> {
+        self.inner.zero_rows()
+    }
+    fn zero_entries(&self) -> Vec<f64> {
+        self.inner.zero_entries()
+    }
+    fn rows(&self) -> &[Row] {
+        self.inner.rows()
+    }
+    fn entry_columns(&self) -> &[usize] {
+        self.inner.entry_columns()
+    }
+    fn constraint_residuals(&mut self, q: &Vec<f64>, residual: &mut Vec<f64>, jacobian: &mut Vec<f64>) {
+        self.counted().constraint_residuals(q, residual, jacobian);
+    }
+    fn project_momenta(&mut self, t: f64, q: &Vec<f64>, p: &mut Vec<f64>, v: &mut Vec<f64>, sigma: &mut Vec<f64>) {
+        self.counted().project_momenta(t, q, p, v, sigma);
+    }
+    fn position_correction(&mut self, q: &Vec<f64>, residual: &mut Vec<f64>, dq: &mut Vec<f64>, pivots: &mut Vec<f64>) {
+        self.counted().position_correction(q, residual, dq, pivots);
+    }
+    fn multipliers(&mut self, t: f64, q: &Vec<f64>, v: &Vec<f64>, lambda: &mut Vec<f64>) {
+        self.counted().multipliers(t, q, v, lambda);
+    }
+}
+
+impl Reducible for Counted {
+    fn acting(&self, acts: &[bool]) -> Self {
+        Counted { inner: self.inner.acting(acts), ..self.clone() }
+    }
+    fn swap_inputs(&mut self, other: &mut Self) {
+        Reducible::swap_inputs(&mut self.inner, &mut other.inner);
+    }
+    fn way(&self) -> Way {
+        Way::Interpreted
+    }
+    fn reaches(&self, contacts: &[Contact<f64>]) -> Vec<Reach<f64>> {
+        let mut reaches = Reducible::reaches(&self.inner, contacts);
+        reaches.iter_mut().filter(|_| self.silent).for_each(|reach| reach.rate = f64::INFINITY);
+        reaches
+    }
+    fn gaps(
+        &mut self,
+        q: &Vec<f64>,
+        v: &Vec<f64>,
+        gaps: &mut Vec<f64>,
+        velocities: &mut Vec<f64>,
+        entries: &mut Vec<f64>,
+    ) {
+        Reducible::gaps(self.counted(), q, v, gaps, velocities, entries);
+    }
+}
+
+/// Absolute values of coordinates, at the places of their velocities; zero for quaternions.
+fn sizes(plan: &Plan, q: &[f64]) -> Vec<f64> {
+    let mut sizes = vec![0.0; plan.dims.nv];
+    for slot in &plan.slots {
+        let kind = plan.model.joints[slot.joint].kind;
+        let n = match kind {
+            JointKind::Spherical => 0,
+            JointKind::Floating => 3,
+            _ => kind.nv(),
+        };
+        if let Some(Source::State { q: from, v }) = slot.at {
+            (0..n).for_each(|k| sizes[v + k] = q[from + k].abs());
+        }
+    }
+    sizes
+}
+
+/// Text of a shape on a body, or on the ground where there is none.
+fn shape(rng: &mut Rng, name: &str, body: Option<&str>, kind: usize) -> String {
+    let kind = match kind {
+        0 => "type = \"point\"".to_string(),
+        1 => "type = \"sphere\"\nradius = 0.1".to_string(),
+        2 => "type = \"capsule\"\nradius = 0.05\nlength = 0.4".to_string(),
+        3 => "type = \"box\"\nsize = [0.3, 0.2, 0.5]".to_string(),
+        4 => "type = \"cylinder\"\nradius = 0.15\nlength = 0.3".to_string(),
+        5 => "type = \"ellipsoid\"\nsemi_axes = [0.1, 0.2, 0.3]".to_string(),
+        _ => "type = \"plane\"".to_string(),
+    };
+    let body = body.map_or(String::new(), |body| format!("body = \"{body}\"\n"));
+    let [xyz, rpy] = [0.3, 2.0].map(|size| [0; 3].map(|_| rng.around(size)));
+    format!("\n[[shape]]\nname = \"{name}\"\n{body}{kind}\nxyz = {xyz:?}\nrpy = {rpy:?}\n")
+}
+
+/// A random mechanism with some contacts between its bodies and the ground, and stops; `None` where no pair fits.
+fn mechanism(seed: u64) -> Option<Model> {
+    let distribution = Distribution {
+        kinds: [1.0; 9],
+        prescribed: 0.0,
+        params: 0.0,
+        wrenches: 0.0,
+        ..Distribution::everything(seed, 6)
+    };
+    let plain = random_model(seed, &distribution);
+    let mut rng = Rng::new(seed, 71);
+    let names: Vec<&str> = plain.bodies.iter().map(|body| body.name.as_str()).collect();
+    let mut text = to_toml(&plain);
+    // A pair that the description does not take is left out.
+    for k in 0..8 {
+        let second = rng.below(names.len());
+        let first = Some(rng.below(names.len() + 1)).filter(|i| *i < names.len());
+        if first == Some(second) {
+            continue;
+        }
+        let kinds = rng.pick(&[[6, 0], [6, 1], [6, 2], [6, 3], [6, 4], [6, 5], [1, 1], [2, 2], [3, 1], [4, 0]]);
+        let more = [
+            shape(&mut rng, &format!("s{k}a"), first.map(|i| names[i]), kinds[0]),
+            shape(&mut rng, &format!("s{k}b"), Some(names[second]), kinds[1]),
+            format!("\n[[contact]]\nname = \"c{k}\"\nbetween = [\"s{k}a\", \"s{k}b\"]\n"),
+        ]
+        .concat();
+        let tried = format!("{text}{more}");
+        if read::model("random.toml", &tried, &Default::default()).is_ok() {
+            text = tried;
+        }
+    }
+    read::model("random.toml", &text, &Default::default())
+        .ok()
+        .map(|read| read.model)
+        .filter(|m| !m.contacts.is_empty())
+}
+
+#[test]
+fn gaps_close_no_faster_than_their_bounds() {
+    let (mut count, mut tightest) = (0, 0.0_f64);
+    for seed in 0..300 {
+        let Some(model) = mechanism(seed) else { continue };
+        let plan = Plan::new(&model, 1e-9);
+        let mut mechanism = plan.default_contact_interpreter::<f64>();
+        let reaches = mechanism.reaches().to_vec();
+        let contacts = mechanism.contacts().to_vec();
+        assert_eq!(reaches.len(), contacts.len() * plan.dims.nv);
+        for k in 0..20 {
+            let state = random_state(&plan, 100 * seed + k);
+            let (mut gaps, mut rates) = (mechanism.zero_rows(), mechanism.zero_rows());
+            let mut entries = mechanism.zero_entries();
+            // One velocity at a time, and all of them.
+            let mut v = state.v.clone();
+            if k > 0 && !v.is_empty() {
+                let only = k as usize % v.len();
+                v.iter_mut().enumerate().filter(|(j, _)| *j != only).for_each(|(_, v)| *v = 0.0);
+            }
+            mechanism.gaps(0.0, &state.q, &v, &mut gaps, &mut rates, &mut entries);
+            let size = sizes(&plan, &state.q);
+            for (contact, row) in contacts.iter().zip(reaches.chunks(plan.dims.nv.max(1))) {
+                let sum = |of: &dyn Fn(&Reach<f64>, usize) -> f64| -> f64 {
+                    row.iter().enumerate().map(|(j, reach)| of(reach, j)).sum()
+                };
+                let arm = sum(&|reach, j| reach.slide * size[j]);
+                let bound = sum(&|reach, j| (reach.rate + reach.turn * arm) * v[j].abs());
+                let rate = rates[contact.row].abs();
+                if !rate.is_finite() {
+                    continue;
+                }
+                count += 1;
+                assert!(
+                    bound.is_finite() && rate <= bound * (1.0 + 1e-12) + 1e-12,
+                    "{seed}: {rate} {bound}\n{}",
+                    to_toml(&model)
+                );
+                if bound > 0.0 {
+                    tightest = tightest.max(rate / bound);
+                }
+            }
+        }
+    }
+    assert!(count > 2000, "{count}");
+    assert!(tightest > 0.99, "{tightest}");
+}
+
+type Timed = WithContacts<ModeTable<Counted>>;
+
+fn projection<Y: Constrained<Scalar = f64>>(system: &Y) -> Projection<Y> {
+    Projection::new(system, Stabilisation::Mass, Effort { energy: f64::INFINITY, ..Effort::default() })
+}
+
+/// A quadruped 10 m above the floor whose legs swing.
+fn quadruped() -> (Plan, Vec<f64>, Vec<f64>) {
+    // Springs keep the knees off their stops.
+    let text = include_str!("../../../models/contacts/quadruped.toml");
+    let text = ["1.4", "-1.4"].into_iter().fold(text.to_string(), |text, at| {
+        let sprung = format!("start = {at}\nstiffness = 1\nrest = {at}\ndamping = 0.005\n");
+        text.replace(&format!("start = {at}\n"), &sprung)
+    });
+    let plan = Plan::new(&model(&text), 1e-9);
+    let mut q = plan.start();
+    q[2] = 10.0;
+    let mut v = vec![0.0; plan.dims.nv];
+    v[2] = 3.0;
+    for leg in 0..4 {
+        let sign = if leg == 0 || leg == 3 { 1.0 } else { -1.0 };
+        v[6 + 3 * leg..9 + 3 * leg].copy_from_slice(&[0.5 * sign, 8.0 * sign, 0.0]);
+    }
+    (plan, q, v)
+}
+
+/// A body with a telescopic leg, 10 m above the floor, that turns over.
+fn monopod() -> (Plan, Vec<f64>, Vec<f64>) {
+    let text = r#"
+gravity = [0, 0, -9.81]
+body = [{ name = "trunk", mass = 2, inertia = [0.02, 0.02, 0.02] }, { name = "thigh", mass = 0.3, inertia = [0.001, 0.001, 0.001] }, { name = "shank", mass = 0.2, inertia = [0.001, 0.001, 0.001] }]
+joint = [
+    { name = "trunk", type = "planar", child = "trunk", rpy = [1.5707963267948966, 0, 0], start = [0, 10, 0] },
+    { name = "hip", type = "revolute", parent = "trunk", child = "thigh", axis = [0, 0, 1], start = 0.3 },
+    { name = "leg", type = "prismatic", parent = "thigh", child = "shank", xyz = [0, -0.3, 0], axis = [0, -1, 0], stiffness = 500 },
+]
+shape = [{ name = "floor", type = "plane" }, { name = "foot", body = "shank", type = "sphere", radius = 0.03, xyz = [0, -0.1, 0] }]
+contact = [{ name = "sole", between = ["floor", "foot"], friction = 0.8 }]
+"#;
+    let plan = Plan::new(&model(text), 1e-9);
+    let q = plan.start();
+    (plan, q, vec![1.0, 3.0, 5.0, -4.0, 0.2])
+}
+
+/// A four-bar that turns, 10 m above a floor.
+fn fourbar() -> (Plan, Vec<f64>, Vec<f64>) {
+    let text = include_str!("../../../models/contacts/fourbar_stop.toml");
+    let text = text.replace("limits = { lower = { deg = 91 } }\nlimit_restitution = 0.5\n", "");
+    let floor = r#"
+[[shape]]
+name = "floor"
+type = "plane"
+xyz = [0, 0, -10]
+
+[[shape]]
+name = "tip"
+body = "coupler"
+type = "point"
+xyz = [0.18, 0, 0.12]
+
+[[contact]]
+name = "touch"
+between = ["floor", "tip"]
+"#;
+    let plan = Plan::new(&model(&format!("{text}{floor}")), 1e-9);
+    let (mut q, v) = (plan.start(), vec![0.0; plan.dims.nv]);
+    close(&mut plan.default_interpreter::<f64>(), &mut q, &Closing::default()).unwrap();
+    (plan, q, v)
+}
+
+/// Sweeps over a mechanism with and without contacts.
+fn sweeps((plan, q, v): &(Plan, Vec<f64>, Vec<f64>), method: &str, tolerance: f64, time: f64) -> [u64; 2] {
+    let step = Step::Adaptive(Tolerances::new(tolerance));
+    let mut p = v.clone();
+    let mut free = Counted::new(plan.default_interpreter());
+    free.conjugate_momenta(q, v, &mut p);
+    let count = free.sweeps.clone();
+    let mut by: BoxedMethod<Counted> = catalogue::explicit(method, &free, false).unwrap();
+    if !free.rows().is_empty() {
+        by = Box::new(WithPostStep::new(&free, by, projection(&free)));
+    }
+    let mut solver = Solver::new(&mut free, by, step, 0.0, q, &p).unwrap();
+    count.set(0);
+    solver.run(&mut free, time).unwrap();
+    let without = count.get();
+
+    let params = plan.default_params();
+    let full = Counted::new(plan.with_contacts().interpreter(&params));
+    let count = full.sweeps.clone();
+    let mut system = WithContacts::new(ModeTable::new(full, plan.contacts()));
+    let by: BoxedMethod<Timed> = catalogue::explicit(method, &system, false).unwrap();
+    let by = WithPostStep::new(&system, by, projection(&system));
+    let mut motion = Hybrid::new(&mut system, by, step, 0.0, q, &p).unwrap();
+    count.set(0);
+    motion.run(&mut system, time, &mut ()).unwrap();
+    assert_eq!(motion.contact_statistics().events, 0);
+    [count.get(), without]
+}
+
+#[test]
+fn far_contacts_cost_a_twentieth_at_most() {
+    for (name, scene) in [("quadruped", quadruped()), ("monopod", monopod()), ("fourbar", fourbar())] {
+        for method in ["verner9", "dop853", "tsit5"] {
+            for tolerance in [1e-9, 1e-12] {
+                let [with, without] = sweeps(&scene, method, tolerance, 1.0);
+                assert!(20 * with <= 21 * without, "{name} {method} {tolerance:e}: {with} {without}");
+            }
+        }
+    }
+}
+
+#[derive(Default)]
+struct Landings(Vec<(f64, usize)>);
+
+impl ContactObserver<ModeTable<Counted>> for Landings {
+    fn event(&mut self, _system: &mut Timed, event: &ContactEvent<f64>) {
+        self.0.push((event.time, event.contact));
+    }
+}
+
+#[test]
+fn what_is_not_looked_at_changes_nothing() {
+    let (plan, q, v) = quadruped();
+    let events = [false, true].map(|silent| {
+        let mut full = Counted::new(plan.with_contacts().interpreter(&plan.default_params()));
+        full.silent = silent;
+        let count = full.sweeps.clone();
+        let mut mechanism = ModeTable::new(full, plan.contacts());
+        let mut p = v.clone();
+        mechanism.conjugate_momenta(&q, &v, &mut p);
+        let mut system = WithContacts::new(mechanism);
+        let by = WithPostStep::new(&system, Verner9::new(&system), projection(&system));
+        let step = Step::Adaptive(Tolerances::new(1e-12));
+        let mut motion = Hybrid::new(&mut system, by, step, 0.0, &q, &p).unwrap();
+        let mut landings = Landings::default();
+        while landings.0.len() < 3 {
+            motion.advance(&mut system, 3.0, &mut landings).unwrap();
+        }
+        (landings.0, count.get())
+    });
+    let [(found, few), (other, many)] = events;
+    // It falls for more than 1.7 s.
+    assert!(found[0].0 > 1.7 && many > few + 300, "{found:?} {few} {many}");
+    for (a, b) in found.iter().zip(&other) {
+        assert!(a.1 == b.1 && (a.0 - b.0).abs() < 1e-13, "{found:?} {other:?}");
+    }
+}
+
+#[test]
+fn a_box_that_spins_fast_lands_when_it_does_in_short_steps() {
+    let text = r#"
+name = "spinning_box"
+gravity = [0, 0, -9.81]
+body = [{ name = "box", mass = 1, inertia = [0.01, 0.02, 0.025] }]
+joint = [{ name = "motion", type = "floating", child = "box" }]
+shape = [{ name = "floor", type = "plane" }, { name = "skin", body = "box", type = "box", size = [0.2, 0.3, 0.4] }]
+contact = [{ name = "c", between = ["floor", "skin"] }]
+"#;
+    for spin in [[50.0, 0.0, 0.0], [0.0, 50.0, 0.1], [30.0, 30.0, 26.0]] {
+        let landing = |longest: f64| {
+            let v = [[0.3, 0.0, 0.0], spin].concat();
+            let mut scene = Scene::new(model(text), &[0.0, 0.0, 20.0, 0.0, 0.0, 0.0, 1.0], &v);
+            scene.tolerance = 1e-12;
+            scene.start();
+            if let Some(motion) = &mut scene.motion {
+                motion.limits_mut().max_step = longest;
+            }
+            while scene.events.0.is_empty() {
+                scene.advance(3.0);
+            }
+            (scene.events.0[0].time, scene.events.0[0].contact)
+        };
+        let ([free, short], contacts) = {
+            let [a, b] = [f64::INFINITY, 1e-3].map(landing);
+            ([a.0, b.0], [a.1, b.1])
+        };
+        assert_eq!(contacts[0], contacts[1]);
+        assert!((free - short).abs() < 1e-10, "{spin:?}: {free} {short}");
+    }
+}
+
+/// Least times of a motion in machine code with and without contacts, s, in turns.
+fn times((plan, q, v): &(Plan, Vec<f64>, Vec<f64>), time: f64, rounds: u32) -> [f64; 2] {
+    let step = Step::Adaptive(Tolerances::new(1e-9));
+    let mut free = Compiled::from_plan(plan.clone(), Options::default().of_model(true)).unwrap();
+    let mut p = v.clone();
+    free.conjugate_momenta(q, v, &mut p);
+    let mut system = WithContacts::new(plan.compiled_with_contacts::<f64>(&Options::default(), 10).unwrap());
+    let mut least = [f64::INFINITY; 2];
+    for _ in 0..rounds {
+        let clock = Instant::now();
+        let by: BoxedMethod<Compiled> = catalogue::explicit("verner9", &free, false).unwrap();
+        Solver::new(&mut free, by, step, 0.0, q, &p).unwrap().run(&mut free, time).unwrap();
+        least[0] = least[0].min(clock.elapsed().as_secs_f64());
+        let clock = Instant::now();
+        let by: BoxedMethod<WithContacts<ModeTable<Compiled>>> = catalogue::explicit("verner9", &system, false).unwrap();
+        let by = WithPostStep::new(&system, by, projection(&system));
+        let mut motion = Hybrid::new(&mut system, by, step, 0.0, q, &p).unwrap();
+        motion.run(&mut system, time, &mut ()).unwrap();
+        least[1] = least[1].min(clock.elapsed().as_secs_f64());
+        assert_eq!(motion.contact_statistics().events, 0);
+    }
+    least
+}
+
+/// `cargo test --release -p mbd-testing --test contacts times_of_far -- --ignored --nocapture`
+#[test]
+#[ignore = "times"]
+fn times_of_far_contacts() {
+    for (name, scene) in [("quadruped", quadruped()), ("monopod", monopod())] {
+        let [without, with] = times(&scene, 1.0, 500);
+        println!("{name}: {:.1} µs without contacts, {:.1} µs with: {:.3}", 1e6 * without, 1e6 * with, with / without);
+    }
+}
