@@ -24,6 +24,16 @@ pub trait PostStep<Y: System> {
         p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError>;
 
+    /// Whether [`PostStep::close`] at the end of a step at time `t` (s) would change nothing, so that it need not be called.
+    fn idle(&mut self, _system: &Y, _t: Y::Scalar) -> bool {
+        false
+    }
+
+    /// Whether [`PostStep::restart`] may do anything after the last end of a step.
+    fn may_restart(&self) -> bool {
+        Self::RESTARTS
+    }
+
     /// May change the system and the state from which the next step starts. Returns whether it did: the method then
     /// forgets past steps.
     ///
@@ -89,6 +99,9 @@ where
     /// attempt.
     fn close(&mut self, system: &mut Y, t: Y::Scalar, other: Option<&mut Point<Y>>) -> Result<(), ConstraintError> {
         let WithPostStep { method, post_step, delta, old, new: (q, p), .. } = self;
+        if post_step.idle(system, t) {
+            return Ok(());
+        }
         let (remembers, point) = (method.remembers(), other.unwrap_or(delta));
         method.parts().0.chart().state(system, point, &mut old.0, &mut old.1);
         q.as_mut().copy_from_slice(old.0.as_ref());
@@ -116,7 +129,7 @@ where
 
     /// Work before the next step.
     fn restart(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError> {
-        if B::RESTARTS {
+        if B::RESTARTS && self.post_step.may_restart() {
             let (q, p) = (&mut self.new.0, &mut self.new.1);
             self.method.parts().0.store(system, q, p);
             let restarted = self.post_step.restart(system, t + h, q, p);

@@ -74,6 +74,16 @@ pub trait Policy<Y: Constrained> {
         p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError>;
 
+    /// As [`PostStep::idle`].
+    fn idle(&mut self, _room: &mut Room<Y>, _system: &Y, _t: Y::Scalar) -> bool {
+        false
+    }
+
+    /// As [`PostStep::may_restart`].
+    fn may_restart(&self) -> bool {
+        Self::RESTARTS
+    }
+
     /// Frees the momenta of their multipliers, if it is time; as [`PostStep::restart`].
     ///
     /// # Errors
@@ -270,6 +280,24 @@ where
 {
     const RESTARTS: bool = true;
 
+    /// Where no row acts, there is nothing to close.
+    fn idle(&mut self, room: &mut Room<Y>, system: &Y, t: Y::Scalar) -> bool {
+        if system.rows_act() {
+            return false;
+        }
+        [&mut room.residual, &mut room.sigma, &mut room.pivots]
+            .into_iter()
+            .for_each(|rows| rows.as_mut().fill(Y::Scalar::zero()));
+        (self.corrector.found, self.corrector.rank) = (Y::Scalar::zero(), 0);
+        self.corrector.note(system, t, &room.pivots);
+        (self.corrector.reordered, self.gave_back) = (false, false);
+        true
+    }
+
+    fn may_restart(&self) -> bool {
+        self.gave_back
+    }
+
     fn close(
         &mut self,
         room: &mut Room<Y>,
@@ -284,16 +312,6 @@ where
         let frees = closes || (stabilisation == Stabilisation::Momenta && !remembers);
         let judged = self.energy < f64::INFINITY;
         if !frees && !judged {
-            return Ok(());
-        }
-        if !system.rows_act() {
-            // Nothing to close: what follows would change nothing.
-            [&mut room.residual, &mut room.sigma, &mut room.pivots]
-                .into_iter()
-                .for_each(|rows| rows.as_mut().fill(Y::Scalar::zero()));
-            (self.corrector.found, self.corrector.rank) = (Y::Scalar::zero(), 0);
-            self.corrector.note(system, t, &room.pivots);
-            (self.corrector.reordered, self.gave_back) = (false, false);
             return Ok(());
         }
         self.p.as_mut().copy_from_slice(p.as_ref());
@@ -372,6 +390,15 @@ where
         p: &mut Y::Momenta,
     ) -> Result<(), ConstraintError> {
         self.policy.close(&mut self.room, system, t, remembers, q, p)
+    }
+
+    #[inline]
+    fn idle(&mut self, system: &Y, t: Y::Scalar) -> bool {
+        self.policy.idle(&mut self.room, system, t)
+    }
+
+    fn may_restart(&self) -> bool {
+        self.policy.may_restart()
     }
 
     #[inline]

@@ -21,14 +21,14 @@ where
     }
 
     /// Whether no contact can have closed within the last step, nor since the gaps were looked at. All contacts are open
-    /// then. Takes the travel of the step off the reserves.
-    pub(super) fn stays_apart(&mut self, system: &mut WithContacts<Y>) -> bool {
+    /// then. Takes the travel of the step off the reserves. `near`: the gaps had to be looked at in the step before.
+    pub(super) fn stays_apart(&mut self, system: &mut WithContacts<Y>, near: bool) -> bool {
         if !system.is_open() {
             self.travel.as_mut().fill(Y::Scalar::constant(f64::INFINITY));
             return false;
         }
         // Where displacements alone tell that gaps have to be looked at, rates at the end are not asked for.
-        let apart = [[true, false], [true, true]].into_iter().all(|rates| {
+        let apart = [[true, false], [true, true]].into_iter().skip(usize::from(!near)).all(|rates| {
             let [moved, size] = self.solver.travel(system, rates);
             travels(system.system().reaches(), moved.as_ref(), size.as_ref(), self.travel.as_mut());
             let mut left = self.reserve.as_ref().iter().zip(self.travel.as_ref()).zip(self.ignored.as_ref());

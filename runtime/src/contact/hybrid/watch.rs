@@ -129,7 +129,7 @@ where
             return Ok(None);
         }
         let known = core::mem::replace(&mut self.known, false);
-        if self.stays_apart(system) {
+        if self.stays_apart(system, known) {
             self.rests = false;
             return Ok(None);
         }
