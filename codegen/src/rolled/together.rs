@@ -18,7 +18,8 @@ pub struct Together {
 
 /// Like branches together in an output; `None` where there are none.
 pub fn together(plan: &Plan, group: Output, options: &Options) -> Option<OutputProgram<Together>> {
-    if !matches!(plan.acts, RowsThatAct::All) || plan.dims.rows > 0 {
+    // Where the open modes of contacts leave no row, branches are as alike as without contacts.
+    if matches!(plan.acts, RowsThatAct::Input) || !plan.constraints.is_empty() {
         return None;
     }
     if options.plan.branches == LikeBranches::Apart {
