@@ -50,6 +50,21 @@ pub trait PostStep<Y: System> {
     }
 }
 
+/// No change: for mechanisms without loops.
+impl<Y: System> PostStep<Y> for () {
+    #[inline]
+    fn close(
+        &mut self,
+        _system: &mut Y,
+        _t: Y::Scalar,
+        _remembers: bool,
+        _q: &mut Y::Coordinates,
+        _p: &mut Y::Momenta,
+    ) -> Result<(), ConstraintError> {
+        Ok(())
+    }
+}
+
 /// A method `M` with a [`PostStep`] `B` at the end of every step.
 ///
 /// The end of a step is changed before the step is accepted. A [`Solver`](crate::integrate::Solver) and its dense

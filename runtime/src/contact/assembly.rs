@@ -1,5 +1,6 @@
 //! Velocities for forces of contacts: their inverse inertia `A = Φ M⁻¹Φᵀ` at a state, and its like.
 
+use super::lists::{copy, get, set};
 use super::touching::{add_row, along_row};
 use super::{Mode, Touch, Touching, WithContacts};
 use crate::system::Real;
@@ -53,7 +54,7 @@ impl<Y: Touching> WithContacts<Y> {
         self.borrow_modes(open);
         self.response.as_mut().fill(Y::Scalar::zero());
         self.answer(t, q);
-        self.unit.as_mut().copy_from_slice(self.response_v.as_ref());
+        copy(self.unit.as_mut(), self.response_v.as_ref());
     }
 
     /// Velocities of the rows of [`lines`], in columns of the square `a`, for a unit force of each line: the inverse
@@ -95,7 +96,7 @@ impl<Y: Touching> WithContacts<Y> {
     ) {
         self.response.as_mut().fill(Y::Scalar::zero());
         for line in lines(&self.system, of) {
-            let lambda = self.at.lambda.as_ref()[line.row];
+            let lambda = get(self.at.lambda.as_ref(), line.row);
             add_row(&self.system, &self.at.entries, line.row, lambda, &mut self.response);
         }
         self.answer_from_rest(t, q);
@@ -125,7 +126,7 @@ impl<Y: Touching> WithContacts<Y> {
             let c = self.contact(k);
             for row in c.row..c.row + c.rows() {
                 let (system, entries) = (&self.system, &self.at.entries);
-                add_row(system, entries, row, impulses[i], &mut self.p);
+                add_row(system, entries, row, get(impulses, i), &mut self.p);
                 i += 1;
             }
         }
@@ -136,8 +137,9 @@ impl<Y: Touching> WithContacts<Y> {
 pub(super) fn symmetrize<S: Real>(a: &mut [S], n: usize) {
     for i in 0..n {
         for j in 0..i {
-            let mean = S::constant(0.5) * (a[i * n + j] + a[j * n + i]);
-            (a[i * n + j], a[j * n + i]) = (mean, mean);
+            let mean = S::constant(0.5) * (get(a, i * n + j) + get(a, j * n + i));
+            set(a, i * n + j, mean);
+            set(a, j * n + i, mean);
         }
     }
 }

@@ -1,10 +1,9 @@
 //! Impulses, or forces, of contacts at an instant: the problem and the memory for its solution.
 
 use super::assembly::{lines, symmetrize, Forces};
+use super::lists::{first, first_mut, get, set};
 use super::solver::{eliminate, solve_near};
-use super::{
-    solve, Certificate, Contact, ContactError, Effort, Mode, Problem, RestitutionLaw, Touch, Touching, WithContacts,
-};
+use super::{solve, Certificate, Contact, ContactError, Effort, Mode, Problem, Touch, Touching, WithContacts};
 use crate::Scalar;
 
 /// Compliance of a contact among those that share a load, as a part of that by its inertia, and the number of times that
@@ -37,16 +36,7 @@ pub(super) struct Touches<Y: Touching> {
 impl<Y: Touching> Touches<Y> {
     pub fn new(system: &Y) -> Self {
         let rows: usize = system.contacts().iter().map(Contact::rows).sum();
-        let touch = Touch {
-            contact: Contact {
-                row: 0,
-                tangents: false,
-                friction: Y::Scalar::zero(),
-                restitution: Y::Scalar::zero(),
-                law: RestitutionLaw::Poisson,
-            },
-            slip: None,
-        };
+        let touch = Touch { contact: Contact::nowhere(), slip: None };
         Touches {
             count: 0,
             order: system.per_contact(0),
@@ -66,19 +56,19 @@ impl<Y: Touching> Touches<Y> {
 
     /// The contacts that take part.
     pub fn order(&self) -> &[usize] {
-        &self.order.as_ref()[..self.count]
+        first(self.order.as_ref(), self.count)
     }
 
     /// Number of their rows.
     pub fn rows(&self) -> usize {
-        self.problem.as_ref()[..self.count].iter().map(|touch| touch.contact.rows()).sum()
+        first(self.problem.as_ref(), self.count).iter().map(|touch| touch.contact.rows()).sum()
     }
 
     /// Takes one contact into the problem.
     pub fn take(&mut self, system: &WithContacts<Y>, k: usize) {
-        let row = self.rows();
-        self.order.as_mut()[self.count] = k;
-        self.problem.as_mut()[self.count] = Touch { contact: Contact { row, ..system.contact(k) }, slip: None };
+        let touch = Touch { contact: Contact { row: self.rows(), ..system.contact(k) }, slip: None };
+        set(self.order.as_mut(), self.count, k);
+        set(self.problem.as_mut(), self.count, touch);
         self.count += 1;
     }
 
@@ -95,8 +85,8 @@ impl<Y: Touching> Touches<Y> {
     /// Inverse inertia of the contacts in the problem.
     pub fn assemble(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates) {
         let rows = self.rows();
-        let all = Forces { contacts: &self.order.as_ref()[..self.count], touches: None };
-        let a = &mut self.a.as_mut()[..rows * rows];
+        let all = Forces { contacts: first(self.order.as_ref(), self.count), touches: None };
+        let a = first_mut(self.a.as_mut(), rows * rows);
         system.rest(t, q, self.open.as_ref());
         system.responses((t, q), all, a, &mut []);
         system.restore();
@@ -142,11 +132,11 @@ impl<Y: Touching> Touches<Y> {
     pub fn parts(&mut self) -> (Problem<'_, Y::Scalar>, &mut [Y::Scalar], &mut [Y::Scalar]) {
         let rows = self.rows();
         let problem = Problem {
-            a: &self.a.as_ref()[..rows * rows],
-            b: &self.b.as_ref()[..rows],
-            touches: &self.problem.as_ref()[..self.count],
+            a: first(self.a.as_ref(), rows * rows),
+            b: first(self.b.as_ref(), rows),
+            touches: first(self.problem.as_ref(), self.count),
         };
-        (problem, &mut self.impulses.as_mut()[..rows], self.work.as_mut())
+        (problem, first_mut(self.impulses.as_mut(), rows), self.work.as_mut())
     }
 
     /// Forces of the contacts, in `impulses`, at the state that was looked at last: forces and accelerations are
@@ -231,6 +221,6 @@ impl<Y: Touching> Touches<Y> {
     pub fn acceleration(&self, row: usize) -> Y::Scalar {
         let rows = self.rows();
         let (a, b, f) = (self.a.as_ref(), self.b.as_ref(), self.impulses.as_ref());
-        (0..rows).fold(b[row], |sum, column| sum + a[row * rows + column] * f[column])
+        (0..rows).fold(get(b, row), |sum, column| sum + get(a, row * rows + column) * get(f, column))
     }
 }

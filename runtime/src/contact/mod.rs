@@ -7,6 +7,7 @@
 mod assembly;
 mod hybrid;
 mod instant;
+mod lists;
 #[cfg(feature = "alloc")]
 mod mode_table;
 mod motion;
@@ -16,6 +17,8 @@ mod solver;
 mod stepping;
 mod touching;
 mod with_contacts;
+
+use crate::Scalar;
 
 pub use hybrid::{
     Cause, ContactEvent, ContactObserver, ContactRules, ContactStatistics, Hybrid, HybridError, SaltationError,
@@ -27,7 +30,7 @@ pub use motion::{ContactMotion, Regime, RegimeChange, RegimeChoice, RegimeReason
 pub use solver::{
     impact, solve, work_len, Certificate, ContactError, Effort, Impact, ImpactOptions, ImpactOrder, Problem, Touch,
 };
-pub use stepping::{LastTimeStep, SteppingStatistics, TimeStepping};
+pub use stepping::{ByRules, FixedSweeps, LastTimeStep, StepImpulses, SteppingStatistics, TimeStepping};
 pub use touching::{Reach, Touching};
 pub use with_contacts::WithContacts;
 
@@ -57,6 +60,14 @@ pub struct Contact<S> {
     pub restitution: S,
     /// Law of restitution.
     pub law: RestitutionLaw,
+}
+
+impl<S: Scalar> Contact<S> {
+    /// In the place of a contact that a mechanism does not have: none of its rows is a row of the mechanism.
+    pub(crate) fn nowhere() -> Self {
+        let (row, law) = (usize::MAX / 2, RestitutionLaw::Poisson);
+        Contact { row, tangents: false, friction: S::zero(), restitution: S::zero(), law }
+    }
 }
 
 impl<S> Contact<S> {

@@ -220,7 +220,7 @@ where
     }
 
     /// What happened at the contacts, in time steps.
-    pub fn stepping_statistics(&self) -> &SteppingStatistics {
+    pub fn stepping_statistics(&self) -> &SteppingStatistics<Y::Scalar> {
         self.steps.statistics()
     }
 

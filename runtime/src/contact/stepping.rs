@@ -15,12 +15,18 @@
 //! that of an impact with velocities that approach no slower. What friction holds does not move.
 
 use super::instant::Touches;
-use super::{impact, ContactError, ContactRules, Effort, HybridError, ImpactOptions, Stretch, Touching, WithContacts};
+use super::lists::{copy, first, get, set};
+use super::solver::impact_by_sweeps;
+use super::{
+    impact, ContactError, ContactRules, Effort, HybridError, Impact, ImpactOptions, Problem, Stretch, Touching,
+    WithContacts,
+};
 use crate::constrained::PostStep;
 use crate::error::StepError;
 use crate::integrate::{Chart, Point};
 use crate::system::Real;
 use crate::Scalar;
+use core::marker::PhantomData;
 
 /// Relative residual of impulses that is enough where that of the rules is not reached: steps err by more.
 const RESIDUAL: f64 = 1e-7;
@@ -28,7 +34,7 @@ const RESIDUAL: f64 = 1e-7;
 /// What happened in a motion by time steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
-pub struct SteppingStatistics {
+pub struct SteppingStatistics<S = f64> {
     /// Steps.
     pub steps: u64,
     /// Steps with impulses.
@@ -40,18 +46,81 @@ pub struct SteppingStatistics {
     /// Largest number of contacts with an impulse in a step.
     pub most: u32,
     /// Kinetic energy that impulses have taken, J. Where forces press contacts together, this includes the work of these.
-    pub lost: f64,
+    pub lost: S,
     /// Largest relative residual of the impulses of a step.
-    pub residual: f64,
+    pub residual: S,
     /// Largest overlap at the middle of a step, m (rad for stops of rotations).
-    pub overlap: f64,
+    pub overlap: S,
+}
+
+impl<S: Real> SteppingStatistics<S> {
+    fn new() -> Self {
+        let zero = S::zero();
+        let [steps, touched, changes, limited] = [0; 4];
+        SteppingStatistics { steps, touched, changes, limited, most: 0, lost: zero, residual: zero, overlap: zero }
+    }
+}
+
+/// How the impulses of a time step are found.
+pub trait StepImpulses {
+    /// The impulses of a problem, as [`impact`].
+    ///
+    /// # Errors
+    /// [`ContactError`].
+    fn find<S: Real>(
+        rules: &ContactRules,
+        problem: &Problem<S>,
+        impulses: &mut [S],
+        work: &mut [S],
+    ) -> Result<Impact<S>, ContactError>;
+}
+
+/// By the rules: [`impact`]. Impulses that do not reach the residual of the rules are accepted at one of 1e-7.
+#[derive(Clone, Copy, Debug)]
+pub struct ByRules;
+
+impl StepImpulses for ByRules {
+    fn find<S: Real>(
+        rules: &ContactRules,
+        problem: &Problem<S>,
+        impulses: &mut [S],
+        work: &mut [S],
+    ) -> Result<Impact<S>, ContactError> {
+        let options = ImpactOptions { effort: rules.effort, order: rules.order };
+        let result = impact(problem, &options, impulses, work);
+        match (result, options.effort) {
+            (Err(ContactError::NoConvergence { .. }), Effort::ToTolerance { tolerance, rounds }) => {
+                let effort = Effort::ToTolerance { tolerance: tolerance.max(RESIDUAL), rounds };
+                impact(problem, &ImpactOptions { effort, ..options }, impulses, work)
+            }
+            _ => result,
+        }
+    }
+}
+
+/// By exactly `N` sweeps over the contacts, all of which act at once, whatever the residual is and the rules say: for
+/// processors with a fixed time budget. Nothing is allocated, and numbers stay in the precision of the system. A single
+/// contact with restitution has the impulses of several: of compression, then of expansion.
+#[derive(Clone, Copy, Debug)]
+pub struct FixedSweeps<const N: u32>;
+
+impl<const N: u32> StepImpulses for FixedSweeps<N> {
+    fn find<S: Real>(
+        _: &ContactRules,
+        problem: &Problem<S>,
+        impulses: &mut [S],
+        work: &mut [S],
+    ) -> Result<Impact<S>, ContactError> {
+        impact_by_sweeps(problem, N, impulses, work)
+    }
 }
 
 /// A motion by time steps. The state is the caller's.
 ///
-/// `B` closes loops at the ends of steps: a [`Projection`](crate::constrained::Projection).
+/// `B` closes loops at the ends of steps: a [`Projection`](crate::constrained::Projection), or `()` where there are none.
+/// `I` says how the impulses are found.
 #[derive(Clone, Debug)]
-pub struct TimeStepping<Y: Touching, B> {
+pub struct TimeStepping<Y: Touching, B, I = ByRules> {
     /// Work for the impulses, and their order; other rules have no part in it.
     pub rules: ContactRules,
     /// What closes loops.
@@ -73,7 +142,8 @@ pub struct TimeStepping<Y: Touching, B> {
     span: [Y::Scalar; 2],
     last: (Y::Coordinates, Y::Momenta),
     touching: Touches<Y>,
-    statistics: SteppingStatistics,
+    statistics: SteppingStatistics<Y::Scalar>,
+    impulses: PhantomData<I>,
 }
 
 impl<Y, B> TimeStepping<Y, B>
@@ -83,6 +153,22 @@ where
 {
     /// For a mechanism, whose contacts are all opened: between steps none of them acts.
     pub fn new(system: &mut WithContacts<Y>, post_step: B) -> Self {
+        TimeStepping::with(system, post_step)
+    }
+
+    /// The same with `N` sweeps for the impulses of every step: [`FixedSweeps`].
+    pub fn fixed_work<const N: u32>(system: &mut WithContacts<Y>, post_step: B) -> TimeStepping<Y, B, FixedSweeps<N>> {
+        TimeStepping::with(system, post_step)
+    }
+}
+
+impl<Y, B, I> TimeStepping<Y, B, I>
+where
+    Y: Touching,
+    B: PostStep<WithContacts<Y>>,
+    I: StepImpulses,
+{
+    fn with(system: &mut WithContacts<Y>, post_step: B) -> Self {
         system.open_all();
         let inner = system.system();
         TimeStepping {
@@ -101,12 +187,13 @@ where
             span: [Y::Scalar::zero(); 2],
             last: (inner.neutral(), inner.zero_momenta()),
             touching: Touches::new(inner),
-            statistics: SteppingStatistics::default(),
+            statistics: SteppingStatistics::new(),
+            impulses: PhantomData,
         }
     }
 
     /// What happened so far.
-    pub fn statistics(&self) -> &SteppingStatistics {
+    pub fn statistics(&self) -> &SteppingStatistics<Y::Scalar> {
         &self.statistics
     }
 
@@ -116,7 +203,7 @@ where
     }
 
     /// The last step, which ended in a state: what is between its ends, to first order.
-    pub fn last_step<'a>(&'a mut self, q: &'a Y::Coordinates, p: &'a Y::Momenta) -> LastTimeStep<'a, Y, B> {
+    pub fn last_step<'a>(&'a mut self, q: &'a Y::Coordinates, p: &'a Y::Momenta) -> LastTimeStep<'a, Y, B, I> {
         LastTimeStep { stepping: self, q, p }
     }
 
@@ -138,7 +225,7 @@ where
         self.take(system, half);
         self.pressed[1].as_mut().fill(false);
         if self.touching.count > 0 {
-            self.v.as_mut().copy_from_slice(system.at.v.as_ref());
+            copy(self.v.as_mut(), system.at.v.as_ref());
             self.collide(system, t + h)?;
             system.look(t + h, &self.q, &self.p);
             for (v, after) in self.v.as_mut().iter_mut().zip(system.at.v.as_ref()) {
@@ -149,14 +236,14 @@ where
         let closed = self.post_step.close(system, t + h, false, &mut self.q, &mut self.p);
         closed.map_err(|error| StepError::Constraint { time: t.to_f64(), error })?;
         self.span = [t, t + h];
-        self.last.0.as_mut().copy_from_slice(q.as_ref());
-        self.last.1.as_mut().copy_from_slice(p.as_ref());
-        q.as_mut().copy_from_slice(self.q.as_ref());
-        p.as_mut().copy_from_slice(self.p.as_ref());
+        copy(self.last.0.as_mut(), q.as_ref());
+        copy(self.last.1.as_mut(), p.as_ref());
+        copy(q.as_mut(), self.q.as_ref());
+        copy(p.as_mut(), self.p.as_ref());
         self.statistics.steps += 1;
         let [last, now] = &mut self.pressed;
         self.statistics.changes += u64::from(last.as_ref() != now.as_ref());
-        last.as_mut().copy_from_slice(now.as_ref());
+        copy(last.as_mut(), now.as_ref());
         Ok(())
     }
 
@@ -185,9 +272,9 @@ where
     ) -> Result<(), HybridError> {
         let half = Y::Scalar::constant(0.5) * h;
         system.look(t, q, p);
-        self.before.as_mut().copy_from_slice(system.at.velocities.as_ref());
-        self.q.as_mut().copy_from_slice(q.as_ref());
-        self.p.as_mut().copy_from_slice(system.p.as_ref());
+        copy(self.before.as_mut(), system.at.velocities.as_ref());
+        copy(self.q.as_mut(), q.as_ref());
+        copy(self.p.as_mut(), system.p.as_ref());
         self.chart.load(system, t.to_f64(), &self.q, &self.p)?;
         self.start.clear();
         self.rate_at(system, t);
@@ -209,7 +296,7 @@ where
     fn rate_at(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar) {
         let Self { chart, start, point, q, p, qd, pd, .. } = self;
         system.system.rates_at(t, q, p, qd, pd);
-        point.p.as_mut().copy_from_slice(pd.as_ref());
+        copy(point.p.as_mut(), pd.as_ref());
         chart.rates(system, start, (q, p), qd, point);
     }
 
@@ -242,9 +329,8 @@ where
         for k in 0..system.modes().len() {
             let (rate, c) = (system.gap_rate(k), system.contact(k));
             let gap = system.gap(k) - half * rate;
-            let overlap = -gap.to_f64();
-            self.statistics.overlap = self.statistics.overlap.max(overlap);
-            let start = self.before.as_ref()[c.row];
+            self.statistics.overlap = larger(self.statistics.overlap, -gap);
+            let start = get(self.before.as_ref(), c.row);
             // Forces alone change the rate of the gap by `rate − start` in a step.
             let bounces = c.restitution > zero && start < (rate - start) + (rate - start);
             let ahead = if bounces || !(gap > zero) { zero } else { gap / half };
@@ -252,11 +338,12 @@ where
                 continue;
             }
             self.touching.take(system, k);
-            let touch = &mut self.touching.problem.as_mut()[self.touching.count - 1];
-            touch.contact.restitution = if bounces { c.restitution } else { zero };
+            if let Some(touch) = self.touching.problem.as_mut().get_mut(self.touching.count - 1) {
+                touch.contact.restitution = if bounces { c.restitution } else { zero };
+            }
             for row in c.row..c.row + c.rows() {
                 let shift = if row == c.row { ahead } else { zero };
-                self.touching.b.as_mut()[at] = system.at.velocities.as_ref()[row] + shift;
+                set(self.touching.b.as_mut(), at, get(system.at.velocities.as_ref(), row) + shift);
                 at += 1;
             }
         }
@@ -266,48 +353,52 @@ where
     fn collide(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar) -> Result<(), HybridError> {
         let touching = &mut self.touching;
         touching.assemble(system, t, &self.q);
-        let options = ImpactOptions { effort: self.rules.effort, order: self.rules.order };
         let (problem, impulses, work) = touching.parts();
-        let mut result = impact(&problem, &options, impulses, work);
-        if let (Err(ContactError::NoConvergence { .. }), Effort::ToTolerance { tolerance, rounds }) =
-            (result, options.effort)
-        {
-            let effort = Effort::ToTolerance { tolerance: tolerance.max(RESIDUAL), rounds };
-            result = impact(&problem, &ImpactOptions { effort, ..options }, impulses, work);
-        }
-        let result = result.map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
+        let result = I::find(&self.rules, &problem, impulses, work)
+            .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
         // The work of the impulses: less than that with the velocities that were asked for, by what is still to be closed.
-        let ahead = touching.order.as_ref()[..touching.count].iter().zip(touching.problem.as_ref());
+        let ahead = first(touching.order.as_ref(), touching.count).iter().zip(touching.problem.as_ref());
         let shift = ahead.fold(Y::Scalar::zero(), |sum, (k, touch)| {
             let row = touch.contact.row;
-            sum + touching.impulses.as_ref()[row] * (touching.b.as_ref()[row] - system.gap_rate(*k))
+            sum + get(touching.impulses.as_ref(), row) * (get(touching.b.as_ref(), row) - system.gap_rate(*k))
         });
         system.kick(touching.order(), touching.impulses.as_ref());
-        for (k, touch) in touching.order.as_ref()[..touching.count].iter().zip(touching.problem.as_ref()) {
-            self.pressed[1].as_mut()[*k] = touching.impulses.as_ref()[touch.contact.row] > Y::Scalar::zero();
+        for (k, touch) in first(touching.order.as_ref(), touching.count).iter().zip(touching.problem.as_ref()) {
+            let impulse = get(touching.impulses.as_ref(), touch.contact.row);
+            set(self.pressed[1].as_mut(), *k, impulse > Y::Scalar::zero());
         }
-        self.p.as_mut().copy_from_slice(system.p.as_ref());
+        copy(self.p.as_mut(), system.p.as_ref());
         let s = &mut self.statistics;
         s.touched += 1;
         s.limited += u64::from(result.limited.is_some());
         s.most = s.most.max(touching.count as u32);
-        s.lost -= (result.energy - shift).to_f64();
-        s.residual = s.residual.max(result.certificate.residual.to_f64());
+        s.lost = s.lost - (result.energy - shift);
+        s.residual = larger(s.residual, result.certificate.residual);
         Ok(())
     }
 }
 
+/// The larger of two numbers, of which the second may be none.
+fn larger<S: Real>(most: S, x: S) -> S {
+    if x > most {
+        x
+    } else {
+        most
+    }
+}
+
 /// The last of the time steps.
-pub struct LastTimeStep<'a, Y: Touching, B> {
-    stepping: &'a mut TimeStepping<Y, B>,
+pub struct LastTimeStep<'a, Y: Touching, B, I = ByRules> {
+    stepping: &'a mut TimeStepping<Y, B, I>,
     q: &'a Y::Coordinates,
     p: &'a Y::Momenta,
 }
 
-impl<Y, B> Stretch<Y> for LastTimeStep<'_, Y, B>
+impl<Y, B, I> Stretch<Y> for LastTimeStep<'_, Y, B, I>
 where
     Y: Touching,
     B: PostStep<WithContacts<Y>>,
+    I: StepImpulses,
 {
     fn span(&self) -> [Y::Scalar; 2] {
         self.stepping.span
@@ -320,16 +411,16 @@ where
             true => (begin, stepping.last.0.as_ref(), stepping.last.1.as_ref()),
             false => (end, self.q.as_ref(), self.p.as_ref()),
         };
-        stepping.q.as_mut().copy_from_slice(from_q);
-        stepping.p.as_mut().copy_from_slice(from_p);
-        q.as_mut().copy_from_slice(from_q);
-        p.as_mut().copy_from_slice(from_p);
+        copy(stepping.q.as_mut(), from_q);
+        copy(stepping.p.as_mut(), from_p);
+        copy(q.as_mut(), from_q);
+        copy(p.as_mut(), from_p);
         system.look(at, &stepping.q, &stepping.p);
-        stepping.v.as_mut().copy_from_slice(system.at.v.as_ref());
+        copy(stepping.v.as_mut(), system.at.v.as_ref());
         // Where the state cannot be continued, that of the nearer end is the answer.
         if stepping.drift(system, at, t - at).is_ok() {
-            q.as_mut().copy_from_slice(stepping.q.as_ref());
-            p.as_mut().copy_from_slice(stepping.p.as_ref());
+            copy(q.as_mut(), stepping.q.as_ref());
+            copy(p.as_mut(), stepping.p.as_ref());
         }
     }
 }

@@ -7,6 +7,7 @@
 
 use super::assembly::lines;
 use super::instant::Touches;
+use super::lists::{copy, get};
 use super::touching::add_row;
 use super::{Contact, Effort, Mode, Touching};
 use crate::system::{system_within, Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
@@ -193,12 +194,12 @@ impl<Y: Touching> WithContacts<Y> {
     }
 
     pub(super) fn contact(&self, k: usize) -> Contact<Y::Scalar> {
-        self.system.contacts()[k]
+        self.system.contacts().get(k).map_or(Contact::nowhere(), |contact| *contact)
     }
 
     /// Velocities, gaps and their like at a state, in `self.at`.
     pub(super) fn look(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
-        self.p.as_mut().copy_from_slice(p.as_ref());
+        copy(self.p.as_mut(), p.as_ref());
         self.system.project_momenta(t, q, &mut self.p, &mut self.at.v, &mut self.sigma);
         let Contacts { v, gaps, velocities, entries, .. } = &mut self.at;
         self.system.gaps(t, q, v, gaps, velocities, entries);
@@ -206,12 +207,12 @@ impl<Y: Touching> WithContacts<Y> {
 
     /// Gap of contact `k`, m or rad, after [`WithContacts::look`].
     pub(super) fn gap(&self, k: usize) -> Y::Scalar {
-        self.at.gaps.as_ref()[self.contact(k).row]
+        get(self.at.gaps.as_ref(), self.contact(k).row)
     }
 
     /// Rate of the gap of contact `k`, m/s or rad/s, after [`WithContacts::look`].
     pub(super) fn gap_rate(&self, k: usize) -> Y::Scalar {
-        self.at.velocities.as_ref()[self.contact(k).row]
+        get(self.at.velocities.as_ref(), self.contact(k).row)
     }
 
     /// Tangential velocity of contact `k`, m/s, after [`WithContacts::look`].
@@ -219,7 +220,7 @@ impl<Y: Touching> WithContacts<Y> {
         let c = self.contact(k);
         let rows = self.at.velocities.as_ref();
         if c.tangents {
-            [rows[c.row + 1], rows[c.row + 2]]
+            [get(rows, c.row + 1), get(rows, c.row + 2)]
         } else {
             [Y::Scalar::zero(); 2]
         }

@@ -109,6 +109,12 @@ pub fn read_counter() -> (u32, bool) {
     unsafe { (0x00FF_FFFF - SYSTICK.add(2).read_volatile(), SYSTICK.read_volatile() & (1 << 16) != 0) }
 }
 
+/// Ticks since the start, if the counter has not wrapped.
+pub fn now() -> u32 {
+    // SAFETY: as above.
+    unsafe { 0x00FF_FFFF - SYSTICK.add(2).read_volatile() }
+}
+
 /// Number of bytes of stack that the run has used: from the top down to the deepest one without the paint.
 fn stack_used() -> u32 {
     let (mut at, top) = (&raw const _stack_limit, &raw const _stack_top);
@@ -124,7 +130,7 @@ fn stack_used() -> u32 {
 /// Defines `main` for one system and run.
 #[macro_export]
 macro_rules! firmware {
-    ($system:ty, $run:path) => {
+    ($system:ty, $run:expr) => {
         /// Called by the reset handler.
         #[no_mangle]
         pub extern "C" fn main() -> ! {
@@ -155,6 +161,9 @@ where
     print_line("ticks", ticks.into());
     print_line("steps", end.steps.into());
     print_line("evaluations", end.evaluations);
+    for (name, x) in ["costliest", "touched"].into_iter().zip(end.contacts.into_iter().flatten()) {
+        print_line(name, x);
+    }
     exit(!wrapped)
 }
 

@@ -45,7 +45,10 @@ mbd_macros::mbd_model! {
     outputs = [rates, constraint_residuals, project_momenta, position_correction, multipliers, energy]
 }
 
+mod contacts;
 mod mpc;
+
+pub use contacts::{hopping, HopperF32, HopperF64};
 
 /// Number of steps of the short runs.
 pub const STEPS: u32 = 1000;
@@ -70,6 +73,8 @@ pub struct End<Y: System> {
     pub steps: u32,
     /// Number of evaluations of the dynamics.
     pub evaluations: u64,
+    /// Of runs with contacts: ticks of the clock that the costliest step took, and steps with impulses.
+    pub contacts: Option<[u64; 2]>,
 }
 
 /// Error: the number of the step after which the state is unusable. (The integrator's own error contains the time as a
@@ -235,7 +240,7 @@ pub fn swing_up(system: &mut DoublePendulumF32) -> Result<End<DoublePendulumF32>
     }
     let largest = plan.u.iter().fold(0.0_f32, |m, u| if u[0] > m { u[0] } else { m });
     let energy = Some([plan.cost, plan.u[0][0], largest]);
-    Ok(End { q: [a, b], p: [c, d], energy, steps: ITERATIONS, evaluations: dynamics.1 })
+    Ok(End { q: [a, b], p: [c, d], energy, steps: ITERATIONS, evaluations: dynamics.1, contacts: None })
 }
 
 /// [`STEPS`] steps from rest, each joint 0.2 rad further than the one before.
@@ -275,7 +280,7 @@ where
         t = t + h;
         after(system, step, &q, &p);
     }
-    Ok(End { q, p, energy: None, steps, evaluations: method.statistics().evaluations })
+    Ok(End { q, p, energy: None, steps, evaluations: method.statistics().evaluations, contacts: None })
 }
 
 /// The bits of a number, for an exact comparison.
@@ -296,7 +301,7 @@ impl Bits for f64 {
     }
 }
 
-/// Calls `$what!(name, path of the type, path of the run)` for every scene: one firmware image each.
+/// Calls `$what!(name, path of the type, run)` for every scene: one firmware image each.
 #[macro_export]
 macro_rules! each_scene {
     ($what:ident) => {
@@ -310,5 +315,7 @@ macro_rules! each_scene {
         $what!(fourbar_f32, $crate::FourbarF32, $crate::closed);
         $what!(fourbar_f64, $crate::FourbarF64, $crate::closed);
         $what!(acrobot_mpc_f32, $crate::DoublePendulumF32, $crate::swing_up);
+        $what!(hopper_f32, $crate::HopperF32, |system: &mut _| $crate::hopping(system, || 0));
+        $what!(hopper_f64, $crate::HopperF64, |system: &mut _| $crate::hopping(system, || 0));
     };
 }

@@ -8,10 +8,10 @@ fn main() {
     let wanted = std::env::args().nth(1).unwrap_or_default();
     let mut known = Vec::new();
     macro_rules! scene {
-        ($name:ident, $system:ty, $run:path) => {
+        ($name:ident, $system:ty, $run:expr) => {
             known.push(stringify!($name));
             if wanted == stringify!($name) {
-                let end = $run(&mut <$system>::new()).unwrap_or_else(|error| fail(&format!("{wanted}: {error:?}")));
+                let end = ($run)(&mut <$system>::new()).unwrap_or_else(|error| fail(&format!("{wanted}: {error:?}")));
                 end.q.iter().chain(&end.p).for_each(|x| println!("state {:016x}", x.bits()));
                 end.energy.iter().flatten().for_each(|x| println!("energy {:016x}", x.bits()));
                 let line = |name: &str, x: f64| println!("{name} {:016x}", (x * 1e8).ceil() as u64);

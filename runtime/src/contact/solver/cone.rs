@@ -1,6 +1,7 @@
 //! The residual of the laws of contact.
 
 use super::{Problem, Terms, Touch};
+use crate::contact::lists::get;
 use crate::system::Real;
 
 /// Length of a vector; at the origin, where it has no derivative, that of numbers with derivatives is zero.
@@ -28,7 +29,7 @@ pub(super) fn most<S: Real>(problem: &Problem<S>, touch: &Touch<S>) -> S {
     let n = problem.b.len();
     let row = touch.contact.row;
     (row..row + touch.contact.rows()).fold(S::zero(), |most, i| {
-        let own = problem.a[i * n + i];
+        let own = get(problem.a, i * n + i);
         if own > most {
             own
         } else {
@@ -57,14 +58,14 @@ pub(super) fn residual<S: Real>(terms: &Terms<S>, impulses: &[S]) -> (usize, S) 
         let (row, mass) = (c.row, mass(problem, touch));
         let at = |k: usize| {
             if k < c.rows() {
-                (impulses[row + k], terms.velocity(touch, row + k, impulses))
+                (get(impulses, row + k), terms.velocity(touch, row + k, impulses))
             } else {
                 (zero, zero)
             }
         };
         let [(n, vn), (x, vx), (y, vy)] = [at(0), at(1), at(2)];
         // The smaller of impulse and velocity, without a difference in which a small impulse would be lost.
-        let (more, away) = (n - least[row], mass * vn);
+        let (more, away) = (n - get(least, row), mass * vn);
         let normal = if more < away { more } else { away };
         let off = match touch.slip {
             _ if !c.tangents => [normal, zero, zero],
@@ -79,7 +80,7 @@ pub(super) fn residual<S: Real>(terms: &Terms<S>, impulses: &[S]) -> (usize, S) 
         if found > worst.1 || !found.is_finite() {
             worst = (index, found);
         }
-        let start = mass * problem.b[row];
+        let start = mass * get(problem.b, row);
         let own = largest([n, x, if start.abs() > y.abs() { start } else { y }]);
         if own > size {
             size = own;

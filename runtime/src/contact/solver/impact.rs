@@ -1,7 +1,10 @@
 //! Impacts: compression, expansion, and the limit that no energy is gained.
 
 use super::local::Block;
-use super::{energy, routh, solve, solve_above, velocity, Certificate, ContactError, Effort, Problem, Terms};
+use super::{
+    energy, finite, fits, routh, solve_above, swept, velocity, Certificate, ContactError, Effort, Problem, Terms,
+};
+use crate::contact::lists::{copy, get, set, split};
 use crate::contact::RestitutionLaw;
 use crate::system::Real;
 
@@ -62,44 +65,99 @@ pub fn impact<S: Real>(
     impulses: &mut [S],
     work: &mut [S],
 ) -> Result<Impact<S>, ContactError> {
-    let rows = problem.b.len();
+    fits(problem, impulses, work)?;
     impulses.fill(S::zero());
-    let zero = S::zero();
-    let restitution = problem.touches.iter().any(|touch| touch.contact.restitution > zero);
-    let newton = problem.touches.iter().any(|touch| touch.contact.law == RestitutionLaw::Newton);
-    let mut result = Impact {
-        certificate: Certificate { residual: zero, sweeps: 0, newton: 0 },
-        energy: zero,
-        limited: None,
-        rounds: 1,
-    };
+    let mut result = Impact::none();
     if options.order == ImpactOrder::Sequential {
         result.rounds = sequential(problem, options.effort, impulses)?;
-    } else if !restitution {
-        result.certificate = solve(problem, options.effort, impulses, work)?;
-    } else if newton {
-        let (shifted, work) = work.split_at_mut(rows);
-        shifted.copy_from_slice(problem.b);
-        for touch in problem.touches {
-            let row = touch.contact.row;
-            if problem.b[row] < zero {
-                shifted[row] = problem.b[row] + touch.contact.restitution * problem.b[row];
-            }
-        }
-        let asked = Problem { b: shifted, ..*problem };
-        result.certificate = solve(&asked, options.effort, impulses, work)?;
-    } else if let [touch] = problem.touches {
+    } else if let (true, [touch]) = (expands(problem), problem.touches) {
         let block = Block::of(&alone(problem), touch, impulses);
         let found = routh::collide(&block, &touch.contact)?;
-        impulses.copy_from_slice(&found[..rows]);
+        copy(impulses, &found);
     } else {
-        (result.certificate, result.limited) = expand(problem, options.effort, impulses, work)?;
+        let solve = |problem: &Problem<S>, least: &[S], impulses: &mut [S], work: &mut [S]| {
+            solve_above(problem, least, options.effort, impulses, work)
+        };
+        simultaneous(problem, solve, impulses, work, &mut result)?;
     }
+    judged(problem, impulses, result)
+}
+
+/// [`impact`] of all contacts at once by a fixed number of sweeps. A single contact with restitution has the impulses of
+/// several: of compression, then of expansion.
+///
+/// # Errors
+/// [`ContactError::Lengths`], [`ContactError::NotFinite`], [`ContactError::Wedged`].
+pub(in crate::contact) fn impact_by_sweeps<S: Real>(
+    problem: &Problem<S>,
+    count: u32,
+    impulses: &mut [S],
+    work: &mut [S],
+) -> Result<Impact<S>, ContactError> {
+    fits(problem, impulses, work)?;
+    finite(problem)?;
+    impulses.fill(S::zero());
+    let mut result = Impact::none();
+    let solve =
+        |problem: &Problem<S>, least: &[S], impulses: &mut [S], _: &mut [S]| swept(problem, least, count, impulses);
+    simultaneous(problem, solve, impulses, work, &mut result)?;
+    judged(problem, impulses, result)
+}
+
+impl<S: Real> Impact<S> {
+    /// Without impulses.
+    fn none() -> Self {
+        let zero = S::zero();
+        let certificate = Certificate { residual: zero, sweeps: 0, newton: 0 };
+        Impact { certificate, energy: zero, limited: None, rounds: 1 }
+    }
+}
+
+/// Whether any contact has restitution.
+fn bounces<S: Real>(problem: &Problem<S>) -> bool {
+    problem.touches.iter().any(|touch| touch.contact.restitution > S::zero())
+}
+
+/// Whether restitution is an impulse of expansion, and not a velocity that is asked for.
+fn expands<S: Real>(problem: &Problem<S>) -> bool {
+    bounces(problem) && problem.touches.iter().all(|touch| touch.contact.law != RestitutionLaw::Newton)
+}
+
+/// The result with its energy.
+fn judged<S: Real>(problem: &Problem<S>, impulses: &[S], result: Impact<S>) -> Result<Impact<S>, ContactError> {
     if !impulses.iter().all(|p| p.is_finite()) {
         return Err(ContactError::NotFinite);
     }
-    result.energy = energy(problem, impulses);
-    Ok(result)
+    Ok(Impact { energy: energy(problem, impulses), ..result })
+}
+
+/// All contacts at once; `solve(problem, least, impulses, work)` finds impulses with normal ones not below the least.
+fn simultaneous<S: Real, E>(
+    problem: &Problem<S>,
+    solve: impl Fn(&Problem<S>, &[S], &mut [S], &mut [S]) -> Result<Certificate<S>, E>,
+    impulses: &mut [S],
+    work: &mut [S],
+    result: &mut Impact<S>,
+) -> Result<(), E> {
+    let rows = problem.b.len();
+    let zero = S::zero();
+    if expands(problem) {
+        (result.certificate, result.limited) = expand(problem, solve, impulses, work)?;
+        return Ok(());
+    }
+    let (asked, work) = split(work, rows);
+    let (least, work) = split(work, rows);
+    copy(asked, problem.b);
+    least.fill(zero);
+    for touch in problem.touches {
+        let row = touch.contact.row;
+        let before = get(problem.b, row);
+        if touch.contact.restitution > zero && before < zero {
+            set(asked, row, before + touch.contact.restitution * before);
+        }
+    }
+    result.certificate = solve(&Problem { b: asked, ..*problem }, least, impulses, work)?;
+    Ok(())
 }
 
 /// A problem without limits.
@@ -108,27 +166,28 @@ fn alone<'a, S: Real>(problem: &'a Problem<'a, S>) -> Terms<'a, S> {
 }
 
 /// Compression and expansion of several contacts at once.
-fn expand<S: Real>(
+fn expand<S: Real, E>(
     problem: &Problem<S>,
-    effort: Effort,
+    solve: impl Fn(&Problem<S>, &[S], &mut [S], &mut [S]) -> Result<Certificate<S>, E>,
     impulses: &mut [S],
     work: &mut [S],
-) -> Result<(Certificate<S>, Option<S>), ContactError> {
+) -> Result<(Certificate<S>, Option<S>), E> {
     let rows = problem.b.len();
     let (zero, one) = (S::zero(), S::one());
-    let first = solve(problem, effort, impulses, work)?;
-    let (after, work) = work.split_at_mut(rows);
-    let (least, work) = work.split_at_mut(rows);
-    let (expansion, work) = work.split_at_mut(rows);
+    let (after, work) = split(work, rows);
+    let (least, work) = split(work, rows);
+    let (expansion, work) = split(work, rows);
+    least.fill(zero);
+    let first = solve(problem, least, impulses, work)?;
     for (row, v) in after.iter_mut().enumerate() {
         *v = velocity(problem, row, impulses);
     }
-    least.fill(zero);
     for touch in problem.touches {
-        least[touch.contact.row] = touch.contact.restitution * impulses[touch.contact.row];
+        let row = touch.contact.row;
+        set(least, row, touch.contact.restitution * get(impulses, row));
     }
-    expansion.copy_from_slice(least);
-    let second = solve_above(&Problem { b: after, ..*problem }, least, effort, expansion, work)?;
+    copy(expansion, least);
+    let second = solve(&Problem { b: after, ..*problem }, least, expansion, work)?;
     let certificate = Certificate {
         residual: if second.residual > first.residual { second.residual } else { first.residual },
         sweeps: first.sweeps + second.sweeps,

@@ -1,6 +1,7 @@
 //! One contact by itself, exactly.
 
 use super::{cone, Terms, Touch};
+use crate::contact::lists::get;
 use crate::system::Real;
 
 /// Points of the circle of directions between which roots are bracketed.
@@ -30,16 +31,16 @@ impl<S: Real> Block<S> {
         let (problem, row, rows) = (terms.problem, touch.contact.row, touch.contact.rows());
         let (n, zero) = (problem.b.len(), S::zero());
         let mut block = Block { w: [[zero; 3]; 3], q: [zero; 3] };
-        for i in 0..rows {
+        for (i, (w, q)) in block.w.iter_mut().zip(&mut block.q).enumerate().take(rows) {
             let mut own = zero;
-            for j in 0..rows {
-                block.w[i][j] = problem.a[(row + i) * n + row + j];
+            for (j, w) in w.iter_mut().enumerate().take(rows) {
+                *w = get(problem.a, (row + i) * n + row + j);
                 if i == j && terms.alpha > zero {
-                    block.w[i][j] = block.w[i][j] + terms.proximal(touch);
+                    *w = *w + terms.proximal(touch);
                 }
-                own = own + block.w[i][j] * impulses[row + j];
+                own = own + *w * get(impulses, row + j);
             }
-            block.q[i] = terms.velocity(touch, row + i, impulses) - own;
+            *q = terms.velocity(touch, row + i, impulses) - own;
         }
         block
     }
@@ -237,9 +238,9 @@ fn refine<S: Real>(flow: &Flow<S>, ([a, b], at_start): ([S; 2], S)) -> [S; 2] {
         }
         let newton = x - across / slope;
         let next = if newton > low && newton < high { newton } else { S::constant(0.5) * (low + high) };
-        let change = (next - x).abs().to_f64();
+        let change = (next - x).abs();
         x = next;
-        if !(change > S::epsilon()) {
+        if !(change > S::constant(S::epsilon())) {
             break;
         }
     }

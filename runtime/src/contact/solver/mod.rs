@@ -17,11 +17,13 @@ mod routh;
 #[cfg(test)]
 mod tests;
 
+use super::lists::{copy, get, part, set, split};
 use super::Contact;
 use crate::system::Real;
 
 pub(super) use newton::eliminate;
 
+pub(super) use impact::impact_by_sweeps;
 pub use impact::{impact, Impact, ImpactOptions, ImpactOrder};
 
 /// A contact of a problem.
@@ -109,6 +111,8 @@ pub enum ContactError {
     NoDerivative,
     /// A velocity or an inertia is not finite.
     NotFinite,
+    /// A list of a problem, its impulses or its memory is shorter or longer than the number of rows asks for.
+    Lengths,
 }
 
 impl core::fmt::Display for ContactError {
@@ -128,6 +132,9 @@ impl core::fmt::Display for ContactError {
             ),
             ContactError::NoDerivative => {
                 write!(f, "the slip of a collision with restitution and friction turns: derivatives of its impulse are not computed")
+            }
+            ContactError::Lengths => {
+                write!(f, "a list of a contact problem has not the length that its number of rows asks for")
             }
             ContactError::NotFinite => write!(f, "a velocity or an inertia of a contact is not finite"),
         }
@@ -163,8 +170,9 @@ pub fn solve<S: Real>(
     impulses: &mut [S],
     work: &mut [S],
 ) -> Result<Certificate<S>, ContactError> {
+    fits(problem, impulses, work)?;
     let rows = problem.b.len();
-    let (least, work) = work.split_at_mut(rows);
+    let (least, work) = split(work, rows);
     least.fill(S::zero());
     solve_above(problem, least, effort, impulses, work)
 }
@@ -183,7 +191,7 @@ pub(super) fn solve_near<S: Real>(
     work: &mut [S],
 ) -> Result<Certificate<S>, ContactError> {
     if let Effort::ToTolerance { tolerance, .. } = effort {
-        let (least, rest) = work.split_at_mut(problem.b.len());
+        let (least, rest) = split(work, problem.b.len());
         least.fill(S::zero());
         let terms = Terms { problem, least, alpha: S::zero(), anchor: &[] };
         let (_, residual) = cone::residual(&terms, impulses);
@@ -221,7 +229,7 @@ impl<S: Real> Terms<'_, S> {
     fn velocity(&self, touch: &Touch<S>, row: usize, impulses: &[S]) -> S {
         let v = velocity(self.problem, row, impulses);
         if self.alpha > S::zero() {
-            v + self.proximal(touch) * (impulses[row] - self.anchor[row])
+            v + self.proximal(touch) * (get(impulses, row) - get(self.anchor, row))
         } else {
             v
         }
@@ -269,21 +277,14 @@ fn iterate<S: Real>(
     impulses: &mut [S],
     work: &mut [S],
 ) -> Result<Certificate<S>, ContactError> {
-    if !problem.a.iter().chain(problem.b).all(|x| x.is_finite()) {
-        return Err(ContactError::NotFinite);
-    }
-    let (anchor, work) = work.split_at_mut(impulses.len());
-    anchor.copy_from_slice(impulses);
+    finite(problem)?;
+    let (anchor, work) = split(work, impulses.len());
+    copy(anchor, impulses);
     let zero = S::zero();
     let mut progress = Progress { worst: (0, zero), sweeps: 0, newton: 0 };
     let (tolerance, rounds) = match effort {
         Effort::Sweeps(count) => {
-            let terms = Terms { problem, least, alpha: zero, anchor };
-            for _ in 0..count {
-                sweep(&terms, impulses)?;
-            }
-            let (_, residual) = cone::residual(&terms, impulses);
-            return Ok(Certificate { residual, sweeps: count, newton: 0 });
+            return Ok(swept(problem, least, count, impulses)?);
         }
         Effort::ToTolerance { tolerance, rounds } => (tolerance.max(16.0 * S::epsilon()), rounds),
     };
@@ -298,9 +299,9 @@ fn iterate<S: Real>(
     }
     // Proximal steps: each is a problem with a larger diagonal, which is easier.
     let mut alpha = S::constant(PROXIMAL);
-    impulses.copy_from_slice(anchor);
+    copy(impulses, anchor);
     for _ in 0..rounds {
-        anchor.copy_from_slice(impulses);
+        copy(anchor, impulses);
         let terms = Terms { problem, least, alpha, anchor };
         let reached = approach(&terms, 0.1 * tolerance, PLAIN, impulses, &mut progress, work)?;
         let plain = Terms { problem, least, alpha: zero, anchor };
@@ -312,6 +313,40 @@ fn iterate<S: Real>(
     }
     let Progress { worst, sweeps, .. } = progress;
     Err(ContactError::NoConvergence { touch: worst.0, residual: worst.1.to_f64(), sweeps })
+}
+
+/// Tells of lists of other lengths than the number of rows asks for, and of contacts beyond it.
+fn fits<S: Real>(problem: &Problem<S>, impulses: &[S], work: &[S]) -> Result<(), ContactError> {
+    let rows = problem.b.len();
+    let inside = |touch: &Touch<S>| touch.contact.row.checked_add(touch.contact.rows()).is_some_and(|end| end <= rows);
+    let lists = problem.a.len() == rows * rows && impulses.len() == rows && work.len() >= work_len(rows);
+    match lists && problem.touches.iter().all(inside) {
+        true => Ok(()),
+        false => Err(ContactError::Lengths),
+    }
+}
+
+/// Tells of numbers that are not finite.
+fn finite<S: Real>(problem: &Problem<S>) -> Result<(), ContactError> {
+    match problem.a.iter().chain(problem.b).all(|x| x.is_finite()) {
+        true => Ok(()),
+        false => Err(ContactError::NotFinite),
+    }
+}
+
+/// The impulses after a number of sweeps.
+fn swept<S: Real>(
+    problem: &Problem<S>,
+    least: &[S],
+    count: u32,
+    impulses: &mut [S],
+) -> Result<Certificate<S>, Wedge<S>> {
+    let terms = Terms { problem, least, alpha: S::zero(), anchor: &[] };
+    for _ in 0..count {
+        sweep(&terms, impulses)?;
+    }
+    let (_, residual) = cone::residual(&terms, impulses);
+    Ok(Certificate { residual, sweeps: count, newton: 0 })
 }
 
 /// Rounds without proximal terms, and in each proximal step.
@@ -366,14 +401,30 @@ fn improve<S: Real>(
     false
 }
 
+/// A contact of a problem that friction wedges. In the precision of the problem, so that nothing is converted where nobody
+/// asks for the numbers of the error.
+struct Wedge<S> {
+    touch: usize,
+    pivot: S,
+}
+
+impl<S: Real> From<Wedge<S>> for ContactError {
+    #[inline]
+    fn from(Wedge { touch, pivot }: Wedge<S>) -> Self {
+        ContactError::Wedged { touch, pivot: pivot.to_f64() }
+    }
+}
+
 /// Solves every contact by itself, one after the other.
-fn sweep<S: Real>(terms: &Terms<S>, impulses: &mut [S]) -> Result<(), ContactError> {
+fn sweep<S: Real>(terms: &Terms<S>, impulses: &mut [S]) -> Result<(), Wedge<S>> {
     for (index, touch) in terms.problem.touches.iter().enumerate() {
         let row = touch.contact.row;
         let block = local::Block::of(terms, touch, impulses);
-        let found = local::solve(&block, touch, terms.least[row])
-            .map_err(|pivot| ContactError::Wedged { touch: index, pivot: pivot.to_f64() })?;
-        impulses[row..row + touch.contact.rows()].copy_from_slice(&found[..touch.contact.rows()]);
+        let found =
+            local::solve(&block, touch, get(terms.least, row)).map_err(|pivot| Wedge { touch: index, pivot })?;
+        for (k, found) in found.into_iter().enumerate().take(touch.contact.rows()) {
+            set(impulses, row + k, found);
+        }
     }
     Ok(())
 }
@@ -381,8 +432,8 @@ fn sweep<S: Real>(terms: &Terms<S>, impulses: &mut [S]) -> Result<(), ContactErr
 /// Velocity of a row, `b + A P`.
 fn velocity<S: Real>(problem: &Problem<S>, row: usize, impulses: &[S]) -> S {
     let n = problem.b.len();
-    let terms = problem.a[row * n..(row + 1) * n].iter().zip(impulses);
-    terms.fold(problem.b[row], |sum, (a, p)| sum + *a * *p)
+    let terms = part(problem.a, row * n, n).iter().zip(impulses);
+    terms.fold(get(problem.b, row), |sum, (a, p)| sum + *a * *p)
 }
 
 /// Change of the kinetic energy by impulses, `bᵀP + ½ PᵀA P`, J.
