@@ -9,13 +9,25 @@ mbd_macros::mbd_model! {
     path = "../../../models/contacts/hopper.toml",
     name = HopperF32,
     scalar = f32,
-    modes = all
+    modes = ["open open open"]
 }
 mbd_macros::mbd_model! {
     path = "../../../models/contacts/hopper.toml",
     name = HopperF64,
     scalar = f64,
-    modes = all
+    modes = ["open open open"]
+}
+mbd_macros::mbd_model! {
+    path = "../leg.toml",
+    name = LegF32,
+    scalar = f32,
+    modes = ["open open open"]
+}
+mbd_macros::mbd_model! {
+    path = "../leg.toml",
+    name = LegF64,
+    scalar = f64,
+    modes = ["open open open"]
 }
 
 /// Number of steps of the runs with contacts.
@@ -41,13 +53,70 @@ where
     stepped(system, (q, p), now, |_, _, _| ())
 }
 
-/// A run by time steps. `drive` sets the inputs from the state before every step, and `now` reads a clock. The contacts
+/// A leg with motors at hip and knee.
+pub trait Leg: Touching + Energetic + Clone {
+    /// Sets the torques of hip and knee, N m.
+    fn drive(&mut self, torques: [Self::Scalar; 2]);
+}
+
+macro_rules! leg {
+    ($name:ident, $scalar:ty) => {
+        impl Leg for $name {
+            fn drive(&mut self, [hip, knee]: [$scalar; 2]) {
+                self.tau = [0.0, hip, knee];
+            }
+        }
+    };
+}
+leg!(LegF32, f32);
+leg!(LegF64, f64);
+
+/// Stiffness of the controller of the joints, N m/rad, and the torque to which its motors are limited, N m.
+const STIFFNESS: f64 = 8.0;
+const TORQUE: f64 = 2.7;
+/// Angle between thigh and vertical in flight and while crouching, and at the end of a push, rad.
+const CROUCHED: f64 = 1.0;
+const STRETCHED: f64 = 0.5;
+/// Steps of a hop, and of the push in it.
+const HOP: (u32, u32) = (500, 100);
+
+/// Two seconds of one leg that crouches and pushes off every half second. Its motors are springs between the joints and
+/// where they are to be, with a limited torque; the dampers are the model's.
+///
+/// # Errors
+/// [`Unusable`].
+pub fn leg<Y: Leg>(system: &mut Y, now: impl Fn() -> u32) -> Result<End<Y>, Unusable> {
+    let number = Y::Scalar::constant;
+    let mut q = system.neutral();
+    for (q, start) in q.as_mut().iter_mut().zip(LegF64::START) {
+        *q = number(start);
+    }
+    let p = system.zero_momenta();
+    let most = number(TORQUE);
+    stepped(system, (q, p), now, |leg, step, q| {
+        let pushes = step % HOP.0 >= HOP.0 - HOP.1;
+        let angle = number(if pushes { STRETCHED } else { CROUCHED });
+        let [_, hip, knee] = q.as_ref() else { return };
+        leg.drive([angle - *hip, -(angle + angle) - *knee].map(|off| {
+            let torque = number(STIFFNESS) * off;
+            if torque > most {
+                most
+            } else if torque < -most {
+                -most
+            } else {
+                torque
+            }
+        }));
+    })
+}
+
+/// A run by time steps. `drive(system, step, q)` sets the inputs before every step, and `now` reads a clock. The contacts
 /// must have come together and have parted, or the run fails.
 fn stepped<Y>(
     system: &mut Y,
     (mut q, mut p): (Y::Coordinates, Y::Momenta),
     now: impl Fn() -> u32,
-    drive: impl Fn(&mut Y, &Y::Coordinates, &Y::Momenta),
+    drive: impl Fn(&mut Y, u32, &Y::Coordinates),
 ) -> Result<End<Y>, Unusable>
 where
     Y: Touching + Energetic + Clone,
@@ -59,7 +128,7 @@ where
     let mut costliest = 0;
     for step in 1..=STEPS {
         let start = now();
-        drive(system.system_mut(), &q, &p);
+        drive(system.system_mut(), step, &q);
         motion.step(&mut system, t, h, &mut q, &mut p).map_err(|_| Unusable(step))?;
         t = t + h;
         costliest = costliest.max(now().wrapping_sub(start));

@@ -48,7 +48,7 @@ mbd_macros::mbd_model! {
 mod contacts;
 mod mpc;
 
-pub use contacts::{hopping, HopperF32, HopperF64};
+pub use contacts::{hopping, leg, HopperF32, HopperF64, LegF32, LegF64};
 
 /// Number of steps of the short runs.
 pub const STEPS: u32 = 1000;
@@ -317,5 +317,7 @@ macro_rules! each_scene {
         $what!(acrobot_mpc_f32, $crate::DoublePendulumF32, $crate::swing_up);
         $what!(hopper_f32, $crate::HopperF32, |system: &mut _| $crate::hopping(system, || 0));
         $what!(hopper_f64, $crate::HopperF64, |system: &mut _| $crate::hopping(system, || 0));
+        $what!(leg_f32, $crate::LegF32, |system: &mut _| $crate::leg(system, || 0));
+        $what!(leg_f64, $crate::LegF64, |system: &mut _| $crate::leg(system, || 0));
     };
 }
