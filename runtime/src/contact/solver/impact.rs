@@ -48,7 +48,7 @@ const COLLISIONS: u32 = 10_000;
 /// Computes the impulses of an impact, one number for each row, for contacts whose bodies touch; `problem.b` has the
 /// velocities before it, `work` [`work_len`](super::work_len) numbers.
 ///
-/// - Without restitution: [`solve`]. The kinetic energy falls by the work of friction, and by that of the compression.
+/// - Without restitution: [`solve`](super::solve). The kinetic energy falls by the work of friction, and by that of the compression.
 /// - One contact with restitution: Routh's process (Keller, J. Appl. Mech. 53, 1986): the impulse grows from zero, friction
 ///   is that of the velocities of the moment, and the law says where it ends.
 /// - Several contacts at once: the impulses of compression; then those of expansion, with normal ones not below the
