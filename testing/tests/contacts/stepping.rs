@@ -6,8 +6,8 @@ use mbd_runtime::catalogue::{self, BoxedMethod};
 use mbd_runtime::constrained::WithPostStep;
 use mbd_runtime::constrained::{Effort, Projection, Stabilisation};
 use mbd_runtime::contact::{
-    ContactError, ContactMotion, ContactObserver, Effort as ContactEffort, HybridError, Regime, RegimeChange,
-    RegimeChoice, RegimeReason, RegimeRules, SteppingStatistics, TimeStepping, WithContacts,
+    ByRules, ContactError, ContactMotion, ContactObserver, Effort as ContactEffort, FixedSweeps, HybridError, Regime,
+    RegimeChange, RegimeChoice, RegimeReason, RegimeRules, StepImpulses, SteppingStatistics, TimeStepping, WithContacts,
 };
 use mbd_runtime::integrate::{Step, Tolerances};
 use mbd_runtime::{Conjugate, Energetic, System as _};
@@ -16,11 +16,11 @@ use mbd_testing::random::Rng;
 use super::known::{ball, free_box};
 use super::scene::{model, Mechanism, Scene};
 
-type Stepping = TimeStepping<Mechanism, Projection<WithContacts<Mechanism>>>;
+type Closing = Projection<WithContacts<Mechanism>>;
 
-struct Stepped {
+struct Stepped<I = ByRules> {
     system: WithContacts<Mechanism>,
-    stepping: Stepping,
+    stepping: TimeStepping<Mechanism, Closing, I>,
     t: f64,
     q: Vec<f64>,
     p: Vec<f64>,
@@ -28,6 +28,22 @@ struct Stepped {
 
 impl Stepped {
     fn new(model: &Model, q: &[f64], v: &[f64]) -> Stepped {
+        Stepped::by(model, (q, v), TimeStepping::new)
+    }
+}
+
+impl<const N: u32> Stepped<FixedSweeps<N>> {
+    fn by_sweeps(model: &Model, q: &[f64], v: &[f64]) -> Self {
+        Stepped::by(model, (q, v), TimeStepping::fixed_work)
+    }
+}
+
+impl<I: StepImpulses> Stepped<I> {
+    fn by(
+        model: &Model,
+        (q, v): (&[f64], &[f64]),
+        stepping: impl Fn(&mut WithContacts<Mechanism>, Closing) -> TimeStepping<Mechanism, Closing, I>,
+    ) -> Self {
         let plan = Plan::new(model, 1e-9);
         let mut mechanism: Mechanism = plan.default_contact_interpreter();
         let (q, mut p) = (q.to_vec(), v.to_vec());
@@ -35,7 +51,7 @@ impl Stepped {
         let mut system = WithContacts::new(mechanism);
         let effort = Effort { energy: f64::INFINITY, ..Effort::default() };
         let projection = Projection::new(&system, Stabilisation::Mass, effort);
-        let stepping = TimeStepping::new(&mut system, projection);
+        let stepping = stepping(&mut system, projection);
         Stepped { system, stepping, t: 0.0, q, p }
     }
 
@@ -150,6 +166,41 @@ fn a_quadruped_kneels_as_by_events() {
     stepped.run(3.0, 3_000);
     assert!((stepped.q[2] - 0.10155).abs() < 5e-3, "the trunk is at {} m", stepped.q[2]);
     assert!(stepped.statistics().overlap < 5e-3, "{:?}", stepped.statistics());
+}
+
+/// A single contact without friction or restitution is solved by one sweep. The hopper's stops are not reached.
+#[test]
+fn one_sweep_solves_one_contact() {
+    let (hopper, start) = shipped(include_str!("../../../models/contacts/hopper.toml"));
+    let mut by_rules = Stepped::new(&hopper, &start, &[0.0, 0.0]);
+    let mut by_sweeps = Stepped::<FixedSweeps<1>>::by_sweeps(&hopper, &start, &[0.0, 0.0]);
+    by_rules.run(2.0, 2_000);
+    by_sweeps.run(2.0, 2_000);
+    assert!(by_rules.statistics().touched > 0 && by_rules.statistics().most == 1, "{:?}", by_rules.statistics());
+    assert_eq!((by_rules.q, by_rules.p), (by_sweeps.q, by_sweeps.p));
+}
+
+/// The residual and the error of a quadruped's fall with a number of sweeps a step, against impulses by the rules.
+fn fall_by_sweeps<const N: u32>(model: &Model, start: &[f64], by_rules: &[f64]) -> (f64, f64) {
+    let mut stepped = Stepped::<FixedSweeps<N>>::by_sweeps(model, start, &[0.0; 18]);
+    stepped.run(0.5, 500);
+    let off = by_rules.iter().zip(&stepped.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    (stepped.statistics().residual, off)
+}
+
+#[test]
+fn more_sweeps_leave_less() {
+    let (quadruped, start) = shipped(include_str!("../../../models/contacts/quadruped.toml"));
+    let mut by_rules = Stepped::new(&quadruped, &start, &[0.0; 18]);
+    by_rules.run(0.5, 500);
+    let left = [
+        fall_by_sweeps::<2>(&quadruped, &start, &by_rules.q),
+        fall_by_sweeps::<8>(&quadruped, &start, &by_rules.q),
+        fall_by_sweeps::<32>(&quadruped, &start, &by_rules.q),
+    ];
+    println!("{left:?}");
+    assert!(left.windows(2).all(|pair| pair[1].0 < 0.1 * pair[0].0), "{left:?}");
+    assert!(left[2].1 < 1e-6, "{left:?}");
 }
 
 type System = WithContacts<Mechanism>;
