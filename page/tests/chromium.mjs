@@ -4,7 +4,8 @@ import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 
-const FLAGS = ["--headless=new", "--no-sandbox", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-extensions", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--hide-scrollbars", "--remote-debugging-pipe"];
+// Without a GPU the browser composes in software, as for a user; WebGL is drawn by SwiftShader.
+const FLAGS = ["--headless=new", "--no-sandbox", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-extensions", "--enable-unsafe-swiftshader", "--hide-scrollbars", "--remote-debugging-pipe"];
 
 /** A browser; `page` opens a file in it. */
 export async function chromium() {

@@ -261,16 +261,17 @@ function ended(text) {
   trouble("The motion cannot go on", `${text}\nRestart it, change its start, or take shorter steps.`);
 }
 
-/** Draws coarser while a motion is shown by fewer than thirty pictures a second, and sharp again when it stands still. */
+/** Draws coarser while a motion is shown by fewer than forty pictures a second, first without smooth edges, and sharp again when it stands still. */
 function pace(passed) {
   if (!page.playing) {
-    if (canvas.fineness < 1) page.changed = true;
-    [canvas.fineness, page.pace] = [1, 0];
+    if (!canvas.smooth) page.changed = true;
+    [canvas.smooth, canvas.fineness, page.pace] = [true, 1, 0];
     return;
   }
   page.pace += 0.1 * (passed - page.pace);
-  if (page.pace < 1 / 30 || canvas.fineness <= 0.4) return;
-  [canvas.fineness, page.pace] = [Math.max(0.4, 0.75 * canvas.fineness), 0];
+  if (page.pace < 1 / 40 || canvas.fineness <= 0.4) return;
+  if (!canvas.smooth) canvas.fineness = Math.max(0.4, 0.75 * canvas.fineness);
+  [canvas.smooth, page.pace] = [false, 0];
 }
 page.pace = 0;
 
@@ -320,6 +321,7 @@ function draw() {
   if (!scene || !instant || !figure) {
     canvas.begin(rgb(ink.paper));
     canvas.floor(-0.6, [0, 0], 12, 0.5, [...rgb(ink.floor), 1], rgb(ink.grid));
+    canvas.end();
     overlay(ink);
     return;
   }
@@ -330,6 +332,7 @@ function draw() {
   }
   look.trace = tracePoints();
   figure.draw(instant, look, ink);
+  canvas.end();
   overlay(ink);
   $("clock").textContent = `${instant.t.toFixed(3)} s`;
   const scrub = $("scrub");
@@ -342,9 +345,10 @@ page.drawn = 0;
 /** Names, axes and gravity, in two dimensions over the picture. */
 function overlay(ink) {
   const element = $("names"), ratio = Math.min(devicePixelRatio || 1, 2), w = element.clientWidth, h = element.clientHeight;
-  [element.width, element.height] = [Math.round(w * ratio), Math.round(h * ratio)];
-  const c = element.getContext("2d"), { scene, instant, look } = page;
+  const pixels = [Math.round(w * ratio), Math.round(h * ratio)], c = element.getContext("2d"), { scene, instant, look } = page;
+  if (element.width !== pixels[0] || element.height !== pixels[1]) [element.width, element.height] = pixels;
   c.setTransform(ratio, 0, 0, ratio, 0, 0);
+  c.clearRect(0, 0, w + 1, h + 1);
   if (!scene) return;
   c.font = "12px system-ui, sans-serif";
   c.lineJoin = "round";

@@ -32,11 +32,13 @@ void main() {
 class Canvas {
   constructor(element) {
     this.element = element;
-    const gl = element.getContext("webgl2", { antialias: true, stencil: true, preserveDrawingBuffer: true });
+    const gl = element.getContext("webgl2", { antialias: false, stencil: true, preserveDrawingBuffer: true });
     if (!gl) throw new Error("this browser draws no WebGL2: enable hardware acceleration, or take another browser");
     this.gl = gl;
     /** Share of the screen's pixels along an edge that a picture has: less than 1 where the machine draws slowly. */
     this.fineness = 1;
+    /** Whether edges are smooth, by several samples a pixel. Without a GPU they take as long as all the rest. */
+    this.smooth = true;
     this.view = { yaw: -1.1, pitch: 0.38, distance: 4, at: [0, 0, 0] };
     this.prepare();
     element.addEventListener("webglcontextlost", (event) => event.preventDefault());
@@ -61,23 +63,59 @@ class Canvas {
     for (const name of ["M", "V", "colour", "eye", "grid", "centre", "paper", "mode"]) this.places[name] = gl.getUniformLocation(program, name);
     this.meshes = {};
     for (const [name, make] of Object.entries({ tube, cylinder, cone, box, square })) this.meshes[name] = this.mesh(make());
+    this.samples = null;
+  }
+
+  /** Where a picture is drawn: while `smooth` in a buffer of several samples a pixel, otherwise on the canvas. */
+  aim() {
+    const { gl, element: { width: w, height: h } } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    if (!this.smooth) return;
+    if (this.samples?.w !== w || this.samples.h !== h) {
+      this.samples?.parts.forEach((part) => gl.deleteRenderbuffer(part));
+      const buffer = this.samples?.buffer ?? gl.createFramebuffer();
+      gl.bindFramebuffer(gl.FRAMEBUFFER, buffer);
+      const parts = [[gl.RGBA8, gl.COLOR_ATTACHMENT0], [gl.DEPTH24_STENCIL8, gl.DEPTH_STENCIL_ATTACHMENT]].map(([format, place]) => {
+        const part = gl.createRenderbuffer();
+        gl.bindRenderbuffer(gl.RENDERBUFFER, part);
+        gl.renderbufferStorageMultisample(gl.RENDERBUFFER, 4, format, w, h);
+        gl.framebufferRenderbuffer(gl.FRAMEBUFFER, place, gl.RENDERBUFFER, part);
+        return part;
+      });
+      this.samples = { buffer, parts, w, h };
+    }
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.samples.buffer);
+  }
+
+  /** Ends a picture. */
+  end() {
+    if (!this.smooth) return;
+    const { gl, samples: { w, h } } = this;
+    gl.bindFramebuffer(gl.DRAW_FRAMEBUFFER, null);
+    gl.blitFramebuffer(0, 0, w, h, 0, 0, w, h, gl.COLOR_BUFFER_BIT, gl.NEAREST);
   }
 
   mesh(corners) {
-    const gl = this.gl, array = gl.createVertexArray(), buffer = gl.createBuffer();
+    const gl = this.gl, array = gl.createVertexArray(), buffer = gl.createBuffer(), order = gl.createBuffer(), { kept, indices } = shared(corners);
     gl.bindVertexArray(array);
     gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+    gl.bufferData(gl.ARRAY_BUFFER, kept, gl.STATIC_DRAW);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, order);
+    // All triangles, then the few of a coarse picture.
+    const coarse = undivided(indices), all = new Uint32Array(indices.length + coarse.length);
+    all.set(indices);
+    all.set(coarse, indices.length);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, all, gl.STATIC_DRAW);
     for (const k of [0, 1]) {
       gl.enableVertexAttribArray(k);
       gl.vertexAttribPointer(k, 3, gl.FLOAT, false, 24, 12 * k);
     }
-    return { array, buffer, count: corners.length / 6 };
+    return { array, buffers: [buffer, order], fine: [indices.length, 0], coarse: [coarse.length, 4 * indices.length] };
   }
 
   free(mesh) {
     this.gl.deleteVertexArray(mesh.array);
-    this.gl.deleteBuffer(mesh.buffer);
+    mesh.buffers.forEach((buffer) => this.gl.deleteBuffer(buffer));
   }
 
   /** Sets eye and projection for the size that the canvas has. */
@@ -121,6 +159,7 @@ class Canvas {
   begin(paper) {
     const { gl, places } = this;
     this.camera();
+    this.aim();
     gl.clearColor(...paper, 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
     gl.useProgram(this.program);
@@ -139,7 +178,8 @@ class Canvas {
     gl.uniform4fv(places.colour, colour);
     gl.uniform1i(places.mode, mode);
     gl.bindVertexArray(mesh.array);
-    gl.drawArrays(gl.TRIANGLES, 0, mesh.count);
+    const [count, from] = this.fineness < 1 ? mesh.coarse : mesh.fine;
+    gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, from);
   }
 
   /** A floor at a height about a place, with a grid of lines, that fades at a distance. */

@@ -46,6 +46,35 @@ function faceted(corners) {
   return out;
 }
 
+/** Corners that triangles share, once each, and the triangles as indices of them: a ball has a sixth of the corners, and
+ *  every corner is computed once a picture. */
+function shared(corners) {
+  const count = corners.length / 6, words = new Int32Array(Float32Array.from(corners).buffer), indices = new Uint32Array(count);
+  const slots = new Int32Array(2 ** Math.ceil(Math.log2(2 * count + 2))).fill(-1), mask = slots.length - 1, kept = [];
+  for (let k = 0; k < count; k++) {
+    let slot = 0;
+    for (let i = 0; i < 6; i++) slot = Math.imul(slot ^ words[6 * k + i], 0x9e3779b1) ^ (slot >>> 15);
+    const same = (other) => [0, 1, 2, 3, 4, 5].every((i) => words[6 * k + i] === words[6 * other + i]);
+    for (slot &= mask; slots[slot] >= 0 && !same(kept[slots[slot]]); slot = (slot + 1) & mask);
+    if (slots[slot] < 0) slots[slot] = kept.push(k) - 1;
+    indices[k] = slots[slot];
+  }
+  const out = new Float32Array(6 * kept.length);
+  kept.forEach((k, i) => out.set(corners.subarray(6 * k, 6 * k + 6), 6 * i));
+  return { kept: out, indices };
+}
+
+/** The triangles that were divided into four each, of a mesh that consists of such; otherwise those that there are. */
+function undivided(indices) {
+  const coarse = new Uint32Array(indices.length / 4);
+  for (let k = 0; k < indices.length; k += 12) {
+    const [a, d, f, g, b, e, h, i, c, ...middle] = indices.subarray(k, k + 12);
+    if (d !== g || f !== h || e !== i || middle.join() !== [d, e, f].join()) return indices;
+    coarse.set([a, b, c], k / 4);
+  }
+  return coarse;
+}
+
 /** Largest number of triangles of a mesh file. */
 const MOST_TRIANGLES = 400000;
 
