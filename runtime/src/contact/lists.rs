@@ -28,10 +28,22 @@ pub(super) fn part<T>(list: &[T], at: usize, n: usize) -> &[T] {
     list.get(at..).and_then(|rest| rest.get(..n)).unwrap_or_default()
 }
 
-/// An entry.
+/// The `n` entries from `at` on; none where there are fewer.
+#[inline(always)]
+pub(super) fn part_mut<T>(list: &mut [T], at: usize, n: usize) -> &mut [T] {
+    list.get_mut(at..).and_then(|rest| rest.get_mut(..n)).unwrap_or_default()
+}
+
+/// An entry; zero in its place.
 #[inline(always)]
 pub(super) fn get<S: Scalar>(list: &[S], at: usize) -> S {
     list.get(at).map_or(S::zero(), |x| *x)
+}
+
+/// An entry of a list of anything; `none` in its place.
+#[inline(always)]
+pub(super) fn get_or<T: Copy>(list: &[T], at: usize, none: T) -> T {
+    list.get(at).map_or(none, |x| *x)
 }
 
 /// Sets an entry.
@@ -39,6 +51,14 @@ pub(super) fn get<S: Scalar>(list: &[S], at: usize) -> S {
 pub(super) fn set<T>(list: &mut [T], at: usize, x: T) {
     if let Some(entry) = list.get_mut(at) {
         *entry = x;
+    }
+}
+
+/// Swaps as much as both lists have.
+#[inline(always)]
+pub(super) fn swap<T>(one: &mut [T], other: &mut [T]) {
+    for (one, other) in one.iter_mut().zip(other) {
+        core::mem::swap(one, other);
     }
 }
 

@@ -12,6 +12,7 @@ pub use saltation::Tangent;
 pub use saltation_error::SaltationError;
 
 use super::instant::Touches;
+use super::lists::{copy, get_or};
 #[cfg(doc)]
 use super::Way;
 use super::{ContactError, Effort, Impact, ImpactOrder, Mode, RegimeChange, Touching, WithContacts};
@@ -399,8 +400,8 @@ where
         p: &Y::Momenta,
     ) -> Result<(), HybridError> {
         system.open_all();
-        self.q.as_mut().copy_from_slice(q.as_ref());
-        self.p.as_mut().copy_from_slice(p.as_ref());
+        copy(self.q.as_mut(), q.as_ref());
+        copy(self.p.as_mut(), p.as_ref());
         system.look(t, &self.q, &self.p);
         for k in 0..self.count(system) {
             let gap = system.gap(k).to_f64();
@@ -488,7 +489,9 @@ where
         solver.state(system, &mut start.1, &mut start.2);
         system.note_slip(start.0, &start.1, &start.2);
         solver.advance(system, t_end)?;
-        self.statistics.steps[system.system().way() as usize] += 1;
+        if let Some(steps) = self.statistics.steps.get_mut(system.system().way() as usize) {
+            *steps += 1;
+        }
         let found = self.first_event(system)?;
         let end = found.map_or(Y::Scalar::one(), |found| found.theta);
         observer.stretch(system, &mut LastStep { solver: &mut self.solver, end });
@@ -517,6 +520,11 @@ where
             solver.limits.first_step = 2.0 * h.to_f64();
         }
         Ok(())
+    }
+
+    /// Whether contact `k` is left open whatever its gap is.
+    fn ignores(&self, k: usize) -> bool {
+        get_or(self.ignored.as_ref(), k, false)
     }
 
     fn count(&self, system: &WithContacts<Y>) -> usize {
