@@ -1,9 +1,9 @@
 //! Impulses, or forces, of contacts at an instant: the problem and the memory for its solution.
 
 use super::assembly::{lines, symmetrize, Forces};
-use super::lists::{copy, first, first_mut, get, get_or, set, split};
 use super::solver::{eliminate, solve_near};
 use super::{solve, Certificate, Contact, ContactError, Effort, Mode, Problem, Touch, Touching, WithContacts};
+use crate::lists::{copy, first, first_mut, get, get_or, set, split};
 use crate::Scalar;
 
 /// Compliance of a contact among those that share a load, as a part of that by its inertia, and the number of times that

@@ -7,9 +7,9 @@
 
 use super::assembly::lines;
 use super::instant::Touches;
-use super::lists::{copy, first, get, get_or, set};
 use super::touching::add_row;
 use super::{Contact, Effort, Mode, Touching};
+use crate::lists::{copy, first, get, get_or, set};
 use crate::system::{system_within, Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
 use crate::Scalar;
 

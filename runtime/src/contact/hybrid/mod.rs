@@ -12,12 +12,12 @@ pub use saltation::Tangent;
 pub use saltation_error::SaltationError;
 
 use super::instant::Touches;
-use super::lists::{copy, get_or};
 #[cfg(doc)]
 use super::Way;
 use super::{ContactError, Effort, Impact, ImpactOrder, Mode, RegimeChange, Touching, WithContacts};
 use crate::error::StepError;
 use crate::integrate::{Limits, Solver, Statistics, Step, Stepper};
+use crate::lists::get_or;
 use crate::system::Real;
 use crate::Scalar;
 use watch::Watched;
@@ -400,8 +400,8 @@ where
         p: &Y::Momenta,
     ) -> Result<(), HybridError> {
         system.open_all();
-        copy(self.q.as_mut(), q.as_ref());
-        copy(self.p.as_mut(), p.as_ref());
+        self.q.as_mut().copy_from_slice(q.as_ref());
+        self.p.as_mut().copy_from_slice(p.as_ref());
         system.look(t, &self.q, &self.p);
         for k in 0..self.count(system) {
             let gap = system.gap(k).to_f64();

@@ -3,9 +3,9 @@
 use super::watch::Found;
 use super::{Cause, ContactEvent, Departure, Hybrid, HybridError};
 use crate::contact::with_contacts::CREEP;
-use crate::contact::lists::{copy, first, get, get_or, set};
 use crate::contact::{impact, Impact, ImpactOptions, Mode, Touch, Touching, WithContacts};
 use crate::integrate::Stepper;
+use crate::lists::{copy, first, get, get_or, set};
 use crate::system::Real;
 use crate::Scalar;
 

@@ -2,9 +2,9 @@
 
 use super::{Cause, Hybrid, HybridError};
 use crate::contact::with_contacts::CREEP;
-use crate::contact::lists::{copy, first, get, set};
 use crate::contact::{Mode, Touch, Touching, WithContacts};
 use crate::integrate::Stepper;
+use crate::lists::{copy, first, get, set};
 use crate::system::Real;
 use crate::Scalar;
 
@@ -80,7 +80,8 @@ where
             let cause = self.forced.filter(|(contact, ..)| *contact == k).map(|(_, cause, _)| cause);
             // Where the force has just gone to zero, the acceleration starts from zero too.
             let released = cause == Some(Cause::Unloaded);
-            if get(touching.impulses.as_ref(), c.row) <= unloaded && (released || touching.acceleration(c.row) > still) {
+            if get(touching.impulses.as_ref(), c.row) <= unloaded && (released || touching.acceleration(c.row) > still)
+            {
                 continue;
             }
             set(touching.modes.as_mut(), k, Mode::Slide);

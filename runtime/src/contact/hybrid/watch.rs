@@ -1,10 +1,10 @@
 //! The functions that are watched within a step, and the first of their zeros.
 
 use super::{Cause, Hybrid, HybridError};
-use crate::contact::lists::{copy, get_or};
 use crate::contact::{Mode, Touching, WithContacts};
 use crate::integrate::root::{resolution, root};
 use crate::integrate::Stepper;
+use crate::lists::{copy, get_or};
 use crate::system::Real;
 use crate::Scalar;
 

@@ -4,8 +4,8 @@ use super::local::Block;
 use super::{
     energy, finite, fits, routh, solve_above, swept, velocity, Certificate, ContactError, Effort, Problem, Terms,
 };
-use crate::contact::lists::{copy, get, part_mut, set, split};
 use crate::contact::RestitutionLaw;
+use crate::lists::{copy, get, part_mut, set, split};
 use crate::system::Real;
 
 /// In which order the contacts of an impact act.

@@ -17,8 +17,8 @@ mod routh;
 #[cfg(test)]
 mod tests;
 
-use super::lists::{copy, get, part, set, split};
 use super::Contact;
+use crate::lists::{copy, get, part, set, split};
 use crate::system::Real;
 
 pub(super) use newton::eliminate;

@@ -1,7 +1,7 @@
 //! A step of Newton's method on the projection equations of Alart and Curnier (1991), for all contacts at once.
 
 use super::{cone, Terms, Touch};
-use crate::contact::lists::{copy, first_mut, get, part, part_mut, set, split, swap};
+use crate::lists::{copy, first_mut, get, part, part_mut, set, split, swap};
 use crate::system::Real;
 
 /// Added to the diagonal of equations for velocities: where contacts are redundant their matrix is singular, and any of

@@ -6,49 +6,63 @@ use crate::Scalar;
 
 /// The first `n` entries.
 #[inline(always)]
-pub(super) fn first<T>(list: &[T], n: usize) -> &[T] {
+pub(crate) fn first<T>(list: &[T], n: usize) -> &[T] {
     list.get(..n).unwrap_or(list)
 }
 
 /// The first `n` entries.
 #[inline(always)]
-pub(super) fn first_mut<T>(list: &mut [T], n: usize) -> &mut [T] {
+pub(crate) fn first_mut<T>(list: &mut [T], n: usize) -> &mut [T] {
     split(list, n).0
 }
 
 /// The first `n` entries, and the others.
 #[inline(always)]
-pub(super) fn split<T>(list: &mut [T], n: usize) -> (&mut [T], &mut [T]) {
+pub(crate) fn split<T>(list: &mut [T], n: usize) -> (&mut [T], &mut [T]) {
     list.split_at_mut(n.min(list.len()))
 }
 
 /// The `n` entries from `at` on; none where there are fewer.
 #[inline(always)]
-pub(super) fn part<T>(list: &[T], at: usize, n: usize) -> &[T] {
+pub(crate) fn part<T>(list: &[T], at: usize, n: usize) -> &[T] {
     list.get(at..).and_then(|rest| rest.get(..n)).unwrap_or_default()
 }
 
 /// The `n` entries from `at` on; none where there are fewer.
 #[inline(always)]
-pub(super) fn part_mut<T>(list: &mut [T], at: usize, n: usize) -> &mut [T] {
+pub(crate) fn part_mut<T>(list: &mut [T], at: usize, n: usize) -> &mut [T] {
     list.get_mut(at..).and_then(|rest| rest.get_mut(..n)).unwrap_or_default()
 }
 
 /// An entry; zero in its place.
 #[inline(always)]
-pub(super) fn get<S: Scalar>(list: &[S], at: usize) -> S {
+pub(crate) fn get<S: Scalar>(list: &[S], at: usize) -> S {
     list.get(at).map_or(S::zero(), |x| *x)
 }
 
 /// An entry of a list of anything; `none` in its place.
 #[inline(always)]
-pub(super) fn get_or<T: Copy>(list: &[T], at: usize, none: T) -> T {
+pub(crate) fn get_or<T: Copy>(list: &[T], at: usize, none: T) -> T {
     list.get(at).map_or(none, |x| *x)
+}
+
+/// `N` entries from `at` on; zeros in their place.
+#[inline(always)]
+pub(crate) fn some<S: Scalar, const N: usize>(list: &[S], at: usize) -> [S; N] {
+    list.get(at..).and_then(|rest| rest.first_chunk()).map_or([S::zero(); N], |x| *x)
+}
+
+/// Sets the `N` entries from `at` on.
+#[inline(always)]
+pub(crate) fn put<T, const N: usize>(list: &mut [T], at: usize, x: [T; N]) {
+    if let Some(entries) = list.get_mut(at..).and_then(|rest| rest.first_chunk_mut()) {
+        *entries = x;
+    }
 }
 
 /// Sets an entry.
 #[inline(always)]
-pub(super) fn set<T>(list: &mut [T], at: usize, x: T) {
+pub(crate) fn set<T>(list: &mut [T], at: usize, x: T) {
     if let Some(entry) = list.get_mut(at) {
         *entry = x;
     }
@@ -56,7 +70,7 @@ pub(super) fn set<T>(list: &mut [T], at: usize, x: T) {
 
 /// Swaps as much as both lists have.
 #[inline(always)]
-pub(super) fn swap<T>(one: &mut [T], other: &mut [T]) {
+pub(crate) fn swap<T>(one: &mut [T], other: &mut [T]) {
     for (one, other) in one.iter_mut().zip(other) {
         core::mem::swap(one, other);
     }
@@ -64,7 +78,7 @@ pub(super) fn swap<T>(one: &mut [T], other: &mut [T]) {
 
 /// Copies as much as both lists have.
 #[inline(always)]
-pub(super) fn copy<T: Copy>(to: &mut [T], from: &[T]) {
+pub(crate) fn copy<T: Copy>(to: &mut [T], from: &[T]) {
     for (to, from) in to.iter_mut().zip(from) {
         *to = *from;
     }
