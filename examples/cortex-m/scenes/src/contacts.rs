@@ -72,8 +72,8 @@ const TIME: f64 = 2.0;
 const TOLERANCE: f64 = 1e-8;
 const MOST: u32 = 10_000;
 
-/// The same two seconds from event to event: steps of any length, cut where the foot lands or leaves the floor. The foot must
-/// have landed and have left, or the run fails.
+/// The same two seconds from event to event: steps of any length, cut where a contact closes or opens. Both
+/// must have happened, or the run fails.
 ///
 /// # Errors
 /// [`Unusable`].

@@ -255,6 +255,10 @@ struct Departure<S> {
 /// cut there, impulses and modes are computed, and the motion starts again. A gap counts as zero where it touches zero
 /// within a step too, which its rate tells. While all contacts are open, gaps are not looked at before the joints have
 /// moved so far that one of them may have closed ([`Touching::reaches`]).
+///
+/// While contacts are closed, momenta collect their multipliers, and a contact that opens would make velocities of them. So
+/// the method has to free them of these at the ends of steps: [`WithPostStep`](crate::constrained::WithPostStep) with a
+/// [`Projection`](crate::constrained::Projection).
 #[derive(Clone, Debug)]
 pub struct Hybrid<Y: Touching, M> {
     solver: Solver<WithContacts<Y>, M>,
