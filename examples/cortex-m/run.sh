@@ -127,7 +127,8 @@ for scene in "${scenes[@]}"; do
         if grep -q '^costliest ' <<< "$out"; then
             costliest=$((($(value costliest <<< "$out") + 1) * 40)) most=("$costliest")
         fi
-        if grep -q '^event ' <<< "$out"; then
+        # Time steps have no events.
+        if grep -q '^event .*[1-9a-f]' <<< "$out"; then
             event=$((($(value event <<< "$out") + 1) * 40)) most+=("$event")
         fi
         for what in error gap; do

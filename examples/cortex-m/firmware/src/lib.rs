@@ -161,12 +161,8 @@ where
     print_line("ticks", ticks.into());
     print_line("steps", end.steps.into());
     print_line("evaluations", end.evaluations);
-    if let Some(contacts) = end.contacts {
-        print_line("costliest", contacts.costliest.into());
-        if let Some(event) = contacts.event {
-            print_line("event", event.into());
-        }
-        print_line("touched", contacts.touched);
+    for (name, x) in ["costliest", "touched", "event"].into_iter().zip(end.contacts.into_iter().flatten()) {
+        print_line(name, x);
     }
     exit(!wrapped)
 }

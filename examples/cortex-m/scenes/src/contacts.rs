@@ -6,7 +6,7 @@ use mbd_runtime::contact::{Cause, Hybrid, TimeStepping, Touching, WithContacts};
 use mbd_runtime::integrate::{Step, Tolerances, Tsit5};
 use mbd_runtime::{Energetic, Scalar};
 
-use crate::{Contacts, End, Unusable};
+use crate::{End, Unusable};
 
 mbd_macros::mbd_model! {
     path = "../../../models/contacts/hopper.toml",
@@ -112,7 +112,7 @@ where
     let energy = Some([kinetic + potential, statistics.lost, statistics.residual]);
     let evaluations = motion.statistics().evaluations;
     let [costliest, event] = costliest;
-    let contacts = Some(Contacts { costliest, event: Some(event), touched: landed + left });
+    let contacts = Some([costliest.into(), landed + left, event.into()]);
     Ok(End { q, p, energy, steps, evaluations, contacts })
 }
 
@@ -204,5 +204,5 @@ where
     let (kinetic, potential) = system.energies(&q, &p);
     let energy = Some([kinetic + potential, statistics.lost, statistics.overlap]);
     let evaluations = u64::from(STEPS * RATES);
-    Ok(End { q, p, energy, steps: STEPS, evaluations, contacts: Some(Contacts { costliest, event: None, touched }) })
+    Ok(End { q, p, energy, steps: STEPS, evaluations, contacts: Some([costliest.into(), touched, 0]) })
 }

@@ -73,19 +73,9 @@ pub struct End<Y: System> {
     pub steps: u32,
     /// Number of evaluations of the dynamics.
     pub evaluations: u64,
-    /// Of runs with contacts.
-    pub contacts: Option<Contacts>,
-}
-
-/// What was counted in a run with contacts.
-#[derive(Clone, Copy)]
-pub struct Contacts {
-    /// Ticks of the clock that the costliest step took, without those with an event.
-    pub costliest: u32,
-    /// Of runs by events: ticks that the costliest step with an event took.
-    pub event: Option<u32>,
-    /// Steps with impulses, or events.
-    pub touched: u64,
+    /// Of runs with contacts: ticks of the clock that the costliest step without an event took, steps with impulses or
+    /// events, and ticks of the costliest step with an event; zero where the run takes time steps.
+    pub contacts: Option<[u64; 3]>,
 }
 
 /// Error: the number of the step after which the state is unusable. (The integrator's own error contains the time as a
