@@ -1,13 +1,16 @@
 //! The formulas of [`super::chart`] for one joint.
 
-use crate::lists::{copy, get, part, part_mut, put, some};
 use crate::spatial::{add3, cross, dot3, dot4, quaternion_matrix, scale3, ElementaryTransform, Vec3};
 use crate::system::{LieGroup, LieJoint};
 use crate::Scalar;
 
 /// Three components from an index on.
-fn three<S: Scalar>(x: &[S], at: usize) -> Vec3<S> {
-    some(x, at)
+fn three<S: Copy>(x: &[S], at: usize) -> Vec3<S> {
+    [x[at], x[at + 1], x[at + 2]]
+}
+
+fn put<S: Copy>(x: &mut [S], at: usize, value: Vec3<S>) {
+    x[at..at + 3].copy_from_slice(&value);
 }
 
 fn sub3<S: Scalar>(a: Vec3<S>, b: Vec3<S>) -> Vec3<S> {
@@ -25,9 +28,9 @@ pub(super) fn normalise<S: Scalar>(quaternion: &mut [S]) -> S {
 }
 
 /// Quaternion of `cay(φ) R(q)`, of unit length.
-fn turned<S: Scalar>(phi: Vec3<S>, [x, y, z, w]: [S; 4]) -> [S; 4] {
+fn turned<S: Scalar>(phi: Vec3<S>, q: &[S]) -> [S; 4] {
     let half = scale3(S::constant(0.5), phi);
-    let v = [x, y, z];
+    let (v, w) = (three(q, 0), q[3]);
     let vector = add3(add3(v, scale3(w, half)), cross(half, v));
     let mut out = [vector[0], vector[1], vector[2], w - dot3(half, v)];
     normalise(&mut out);
@@ -55,10 +58,10 @@ fn from<S: Scalar>(phi: Vec3<S>, s: Vec3<S>) -> Vec3<S> {
 }
 
 /// Angular velocity in outer axes of the rate of a unit quaternion.
-fn spin<S: Scalar>([x, y, z, w]: [S; 4], [xd, yd, zd, wd]: [S; 4]) -> Vec3<S> {
-    let (v, vd) = ([x, y, z], [xd, yd, zd]);
-    let spin = add3(sub3(scale3(w, vd), scale3(wd, v)), cross(v, vd));
-    scale3(S::constant(2.0), spin)
+fn spin<S: Scalar>(q: &[S], qd: &[S]) -> Vec3<S> {
+    let (v, vd) = (three(q, 0), three(qd, 0));
+    let w = add3(sub3(scale3(q[3], vd), scale3(qd[3], v)), cross(v, vd));
+    scale3(S::constant(2.0), w)
 }
 
 impl LieJoint {
@@ -75,9 +78,9 @@ impl LieJoint {
     fn rotation<S: Scalar>(&self, q: &[S]) -> ElementaryTransform<S> {
         let o = S::zero();
         ElementaryTransform::Rotate(match self.quaternion() {
-            Some(at) => quaternion_matrix(some(q, at)),
+            Some(at) => quaternion_matrix([q[at], q[at + 1], q[at + 2], q[at + 3]]),
             None => {
-                let (s, c) = get(q, self.q + 2).sin_cos();
+                let (s, c) = q[self.q + 2].sin_cos();
                 [[c, -s, o], [s, c, o], [o, o, S::one()]]
             }
         })
@@ -89,10 +92,7 @@ impl LieJoint {
         match self.kind {
             LieGroup::SO3 => ([o; 3], three(p, v)),
             LieGroup::SE3 => (three(p, v), three(p, v + 3)),
-            LieGroup::SE2 => {
-                let [x, y, z] = three(p, v);
-                ([x, y, o], [o, o, z])
-            }
+            LieGroup::SE2 => ([p[v], p[v + 1], o], [o, o, p[v + 2]]),
         }
     }
 
@@ -113,7 +113,7 @@ impl LieJoint {
         match self.kind {
             LieGroup::SO3 => [S::zero(); 3],
             LieGroup::SE3 => three(x, self.v),
-            LieGroup::SE2 => [get(x, self.v), get(x, self.v + 1), S::zero()],
+            LieGroup::SE2 => [x[self.v], x[self.v + 1], S::zero()],
         }
     }
 
@@ -147,15 +147,15 @@ impl LieJoint {
     /// Quaternion at a displacement `x` from `base`.
     pub(super) fn displace<S: Scalar>(&self, base: &[S], x: &[S], q: &mut [S]) {
         if let (Some(at), Some(phi)) = (self.quaternion(), self.phi()) {
-            put(q, at, turned(three(x, phi), some(base, at)));
+            q[at..at + 4].copy_from_slice(&turned(three(x, phi), &base[at..at + 4]));
         }
     }
 
     /// Moves the quaternion by a displacement `x`, in place.
     pub(super) fn advance<S: Scalar>(&self, x: &[S], q: &mut [S]) {
         if let (Some(at), Some(phi)) = (self.quaternion(), self.phi()) {
-            let turned = turned(three(x, phi), some(q, at));
-            put(q, at, turned);
+            let turned = turned(three(x, phi), &q[at..at + 4]);
+            q[at..at + 4].copy_from_slice(&turned);
         }
     }
 
@@ -163,8 +163,8 @@ impl LieJoint {
     /// rotation and the momenta. The rates of positions are known, they stand in `xd`.
     pub(super) fn rates<S: Scalar>(&self, x: &[S], state: (&[S], &[S]), qd: &[S], xd: &mut [S], pd: &mut [S]) {
         let w = match self.quaternion() {
-            Some(at) => spin(some(state.0, at), some(qd, at)),
-            None => [S::zero(), S::zero(), get(qd, self.q + 2)],
+            Some(at) => spin(&state.0[at..at + 4], &qd[at..at + 4]),
+            None => [S::zero(), S::zero(), qd[self.q + 2]],
         };
         self.rates_of_spin(x, state, w, xd, pd);
     }
@@ -227,8 +227,8 @@ impl LieJoint {
     pub(crate) fn body<S: Scalar>(&self, q: &[S], dq: &[S], out: &mut [S]) {
         let r = self.rotation(q);
         let angular = match self.quaternion() {
-            Some(at) => spin(some(q, at), some(dq, at)),
-            None => [S::zero(), S::zero(), get(dq, self.q + 2)],
+            Some(at) => spin(&q[at..at + 4], &dq[at..at + 4]),
+            None => [S::zero(), S::zero(), dq[self.q + 2]],
         };
         // Positions stand first: where `shift` looks for those of a displacement.
         let linear = LieJoint { v: self.q, ..*self }.shift(dq);
@@ -244,7 +244,7 @@ impl LieJoint {
         let (place, speed) = (self.shift(x), self.shift(gp));
         let spin = match self.phi() {
             Some(at) => angular(three(x, at), three(gp, at)),
-            None => [S::zero(), S::zero(), get(gp, self.v + 2)],
+            None => [S::zero(), S::zero(), gp[self.v + 2]],
         };
         let ((linear, about), (force, torque)) = (self.split(p), self.split(gx));
         let about = sub3(about, cross(place, linear));
@@ -274,19 +274,19 @@ impl LieJoint {
         (x, p): (&mut [S], &mut [S]),
     ) {
         if let (Some(at), Some(phi)) = (self.quaternion(), self.phi()) {
-            let (old, new) = (some(q0, at), some(q1, at));
-            let step = scale3(S::one() / dot4(&old, &new), spin(old, new));
+            let (old, new) = (&q0[at..at + 4], &q1[at..at + 4]);
+            let step = scale3(S::one() / dot4(old, new), spin(old, new));
             let back = scale3(-S::one(), three(x, phi));
             put(x, phi, from(step, back));
         }
         let (v, n) = (self.v, self.kind.sizes().1);
         let local = LieJoint { v: 0, ..*self };
         let (mut old, mut new) = ([S::zero(); 6], [S::zero(); 6]);
-        copy(&mut old, part(p0, v, n));
-        copy(&mut new, part(p1, v, n));
+        old[..n].copy_from_slice(&p0[v..v + n]);
+        new[..n].copy_from_slice(&p1[v..v + n]);
         local.outward(q0, before, &mut old);
         local.outward(q1, self.shift(x), &mut new);
-        for (p, (new, old)) in part_mut(p, v, n).iter_mut().zip(new.into_iter().zip(old)) {
+        for (p, (new, old)) in p[v..v + n].iter_mut().zip(new.into_iter().zip(old)) {
             *p = *p + (new - old);
         }
     }
