@@ -46,20 +46,6 @@ pub(crate) fn get_or<T: Copy>(list: &[T], at: usize, none: T) -> T {
     list.get(at).map_or(none, |x| *x)
 }
 
-/// `N` entries from `at` on; zeros in their place.
-#[inline(always)]
-pub(crate) fn some<S: Scalar, const N: usize>(list: &[S], at: usize) -> [S; N] {
-    list.get(at..).and_then(|rest| rest.first_chunk()).map_or([S::zero(); N], |x| *x)
-}
-
-/// Sets the `N` entries from `at` on.
-#[inline(always)]
-pub(crate) fn put<T, const N: usize>(list: &mut [T], at: usize, x: [T; N]) {
-    if let Some(entries) = list.get_mut(at..).and_then(|rest| rest.first_chunk_mut()) {
-        *entries = x;
-    }
-}
-
 /// Sets an entry.
 #[inline(always)]
 pub(crate) fn set<T>(list: &mut [T], at: usize, x: T) {
