@@ -79,13 +79,14 @@ value() {
     echo $((16#$(sed -n "s/^$1 //p")))
 }
 
-# within_limits SCENE BYTES STACK INSTRUCTIONS EVALUATIONS [COSTLIEST] [ERROR [GAP]]: adds to `over` what is above the limits of limits.txt.
+# within_limits SCENE BYTES STACK INSTRUCTIONS EVALUATIONS [COSTLIEST [EVENT]] [ERROR [GAP]]: adds to `over` what is above the limits of limits.txt.
 over=""
 within_limits() {
     local limits what value at=0
     local names=("image bytes" "stack bytes" "instructions/step" evaluations)
     # Scenes with contacts have a number for the costliest step there, and no true energy error.
     [ "$costliest" = - ] || names+=("instructions of the costliest step")
+    [ "$event" = - ] || names+=("instructions of the costliest step with an event")
     names+=("hundred millionths of energy error"
         "hundred millionths of m or rad the loop is open")
     read -ra limits <<< "$(sed -n "s/^$1 //p" limits.txt)"
@@ -121,24 +122,28 @@ for scene in "${scenes[@]}"; do
         bytes=$(value image <<< "$out") stack=$(value stack <<< "$out")
         instructions=$(($(value ticks <<< "$out") * 40 / $(value steps <<< "$out")))
         evaluations=$(value evaluations <<< "$out")
-        most=() costliest=- error=() shown=""
+        most=() costliest=- event=- error=() shown=""
+        # Two readings of the counter are up to a tick off.
         if grep -q '^costliest ' <<< "$out"; then
-            # Two readings of the counter are up to a tick off.
             costliest=$((($(value costliest <<< "$out") + 1) * 40)) most=("$costliest")
+        fi
+        # Time steps have no events.
+        if grep -q '^event .*[1-9a-f]' <<< "$out"; then
+            event=$((($(value event <<< "$out") + 1) * 40)) most+=("$event")
         fi
         for what in error gap; do
             if grep -q "^$what " <<< "$host"; then
                 error+=("$(value $what <<< "$host")") shown+="$(printf '%13s' "$(value $what <<< "$host")e-8")"
             fi
         done
-        table+=$(printf '%-28s %-10s %11d %11d %17d %11d %14s%s' "$scene" "$board" "$bytes" "$stack" "$instructions" \
-            "$evaluations" "$costliest" "$shown")$'\n'
+        table+=$(printf '%-28s %-10s %11d %11d %17d %11d %14s %13s%s' "$scene" "$board" "$bytes" "$stack" "$instructions" \
+            "$evaluations" "$costliest" "$event" "$shown")$'\n'
         within_limits "$scene" "$bytes" "$stack" "$instructions" "$evaluations" "${most[@]}" "${error[@]}"
     done
 done
 
-printf '%-28s %-10s %11s %11s %17s %11s %14s %12s %12s\n' scene board 'image bytes' 'stack bytes' instructions/step \
-    evaluations 'costliest step' 'energy error' 'open by'
+printf '%-28s %-10s %11s %11s %17s %11s %14s %13s %12s %12s\n' scene board 'image bytes' 'stack bytes' instructions/step \
+    evaluations 'costliest step' 'with an event' 'energy error' 'open by'
 printf '%s' "$table"
 echo "every final state and energy has the host's bits; no panic, no allocator"
 [ -z "$over" ] || fail "over the limits of limits.txt:"$'\n'"$over"

@@ -28,6 +28,7 @@ pub mod interval;
 pub mod kernel;
 #[cfg(feature = "alloc")]
 pub mod layout;
+mod lists;
 pub mod notation;
 mod packed;
 mod scalar;

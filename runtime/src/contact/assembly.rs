@@ -1,8 +1,8 @@
 //! Velocities for forces of contacts: their inverse inertia `A = Φ M⁻¹Φᵀ` at a state, and its like.
 
-use super::lists::{copy, get, set};
 use super::touching::{add_row, along_row};
 use super::{Mode, Touch, Touching, WithContacts};
+use crate::lists::{copy, get, set};
 use crate::system::Real;
 use crate::Scalar;
 

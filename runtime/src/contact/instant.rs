@@ -1,9 +1,9 @@
 //! Impulses, or forces, of contacts at an instant: the problem and the memory for its solution.
 
 use super::assembly::{lines, symmetrize, Forces};
-use super::lists::{first, first_mut, get, set};
 use super::solver::{eliminate, solve_near};
 use super::{solve, Certificate, Contact, ContactError, Effort, Mode, Problem, Touch, Touching, WithContacts};
+use crate::lists::{copy, first, first_mut, get, get_or, set, split};
 use crate::Scalar;
 
 /// Compliance of a contact among those that share a load, as a part of that by its inertia, and the number of times that
@@ -59,6 +59,23 @@ impl<Y: Touching> Touches<Y> {
         first(self.order.as_ref(), self.count)
     }
 
+    /// The contact that takes part as number `i`.
+    pub fn contact(&self, i: usize) -> usize {
+        get_or(self.order(), i, usize::MAX)
+    }
+
+    /// The same as a contact of the problem.
+    pub fn touch(&self, i: usize) -> Touch<Y::Scalar> {
+        get_or(self.problem.as_ref(), i, Touch { contact: Contact::nowhere(), slip: None })
+    }
+
+    /// Sets its direction of slip.
+    pub fn set_slip(&mut self, i: usize, slip: Option<[Y::Scalar; 2]>) {
+        if let Some(touch) = self.problem.as_mut().get_mut(i) {
+            touch.slip = slip;
+        }
+    }
+
     /// Number of their rows.
     pub fn rows(&self) -> usize {
         first(self.problem.as_ref(), self.count).iter().map(|touch| touch.contact.rows()).sum()
@@ -97,9 +114,9 @@ impl<Y: Touching> Touches<Y> {
     /// latter.
     fn hold(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates) {
         self.modes.as_mut().fill(Mode::Open);
-        for (i, &k) in self.order.as_ref()[..self.count].iter().enumerate() {
-            let slides = self.problem.as_ref()[i].slip.is_some();
-            self.modes.as_mut()[k] = if slides { Mode::Slide } else { Mode::Stick };
+        for (touch, &k) in self.problem.as_ref().iter().zip(first(self.order.as_ref(), self.count)) {
+            let slides = touch.slip.is_some();
+            set(self.modes.as_mut(), k, if slides { Mode::Slide } else { Mode::Stick });
         }
         system.hold(t, q, self.modes.as_ref());
         self.modes.as_mut().fill(Mode::Open);
@@ -114,13 +131,13 @@ impl<Y: Touching> Touches<Y> {
         let (a, b) = (self.a.as_ref(), self.b.as_mut());
         b.fill(zero);
         let mut column = 0;
-        for (i, &k) in self.order.as_ref()[..self.count].iter().enumerate() {
+        for (touch, &k) in self.problem.as_ref().iter().zip(first(self.order.as_ref(), self.count)) {
             let c = system.contact(k);
             for j in 0..c.rows() {
-                let held = j == 0 || self.problem.as_ref()[i].slip.is_none();
-                let lambda = if held { system.at.lambda.as_ref()[c.row + j] } else { zero };
+                let held = j == 0 || touch.slip.is_none();
+                let lambda = if held { get(system.at.lambda.as_ref(), c.row + j) } else { zero };
                 for (row, b) in b.iter_mut().enumerate().take(rows) {
-                    *b = *b + a[row * rows + column] * lambda;
+                    *b = *b + get(a, row * rows + column) * lambda;
                 }
                 column += 1;
             }
@@ -169,17 +186,18 @@ impl<Y: Touching> Touches<Y> {
     pub fn share(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates) -> bool {
         self.take_closed(system);
         for i in 0..self.count {
-            let k = self.order()[i];
-            if system.modes()[k] == Mode::Slide {
-                self.problem.as_mut()[i].slip = Some(system.direction(k));
+            let k = self.contact(i);
+            if system.mode(k) == Mode::Slide {
+                self.set_slip(i, Some(system.direction(k)));
             }
         }
         self.hold(system, t, q);
         let Touches { count, order, problem, .. } = self;
-        let shared = Forces { contacts: &order.as_ref()[..*count], touches: Some(&problem.as_ref()[..*count]) };
+        let touches = Some(first(problem.as_ref(), *count));
+        let shared = Forces { contacts: first(order.as_ref(), *count), touches };
         let n = lines(&system.system, shared).count();
         system.rest(t, q, self.open.as_ref());
-        system.responses((t, q), shared, &mut self.a.as_mut()[..n * n], self.own.as_mut());
+        system.responses((t, q), shared, first_mut(self.a.as_mut(), n * n), self.own.as_mut());
         system.response_to_multipliers((t, q), shared, self.b.as_mut());
         system.restore();
         self.impulses.as_mut().fill(Y::Scalar::zero());
@@ -188,32 +206,35 @@ impl<Y: Touching> Touches<Y> {
 
     /// The contacts that share a load, for [`lines`].
     pub fn sharing(&self) -> Forces<'_, Y::Scalar> {
-        Forces { contacts: self.order(), touches: Some(&self.problem.as_ref()[..self.count]) }
+        Forces { contacts: self.order(), touches: Some(first(self.problem.as_ref(), self.count)) }
     }
 
     /// Improves the `n` forces of [`Touches::share`].
     fn share_again(&mut self, n: usize) -> bool {
         let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
         let more = Y::Scalar::constant(COMPLIANCE);
-        let (matrix, rest) = self.work.as_mut().split_at_mut(n * n);
-        let rhs = &mut rest[..n];
-        let forces = &mut self.impulses.as_mut()[..n];
-        let own = self.own.as_ref()[..n].iter().zip(self.b.as_ref()).zip(self.a.as_ref().chunks_exact(n));
-        for (row, ((&own, b), a)) in own.enumerate() {
-            let line = &mut matrix[row * n..(row + 1) * n];
+        let (matrix, rest) = split(self.work.as_mut(), n * n);
+        let rhs = first_mut(rest, n);
+        let forces = first_mut(self.impulses.as_mut(), n);
+        let width = n.max(1);
+        let own = self.own.as_ref().iter().zip(self.b.as_ref()).zip(self.a.as_ref().chunks_exact(width));
+        let lines = matrix.chunks_exact_mut(width).zip(rhs.iter_mut().zip(forces.iter()));
+        for (row, ((line, (rhs, force)), ((&own, b), a))) in lines.zip(own).enumerate() {
             line.fill(zero);
             // What cannot move has no force.
-            (line[row], rhs[row]) = (one, zero);
+            set(line, row, one);
+            *rhs = zero;
             if own > zero {
                 for (x, a) in line.iter_mut().zip(a) {
                     *x = *a / own;
                 }
-                line[row] = line[row] + more;
-                rhs[row] = more * forces[row] - *b / own;
+                let held = get(line, row) + more;
+                set(line, row, held);
+                *rhs = more * *force - *b / own;
             }
         }
         let found = eliminate(matrix, rhs);
-        forces.copy_from_slice(rhs);
+        copy(forces, rhs);
         found
     }
 

@@ -7,7 +7,6 @@
 mod assembly;
 mod hybrid;
 mod instant;
-mod lists;
 #[cfg(feature = "alloc")]
 mod mode_table;
 mod motion;

@@ -15,7 +15,6 @@
 //! that of an impact with velocities that approach no slower. What friction holds does not move.
 
 use super::instant::Touches;
-use super::lists::{copy, first, get, set};
 use super::solver::impact_by_sweeps;
 use super::{
     impact, ContactError, ContactRules, Effort, HybridError, Impact, ImpactOptions, Problem, Stretch, Touching,
@@ -24,6 +23,7 @@ use super::{
 use crate::constrained::PostStep;
 use crate::error::StepError;
 use crate::integrate::{Chart, Point};
+use crate::lists::{copy, first, get, set};
 use crate::system::Real;
 use crate::Scalar;
 use core::marker::PhantomData;

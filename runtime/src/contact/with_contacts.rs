@@ -7,9 +7,9 @@
 
 use super::assembly::lines;
 use super::instant::Touches;
-use super::lists::{copy, get};
 use super::touching::add_row;
 use super::{Contact, Effort, Mode, Touching};
+use crate::lists::{copy, first, get, get_or, set};
 use crate::system::{system_within, Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
 use crate::Scalar;
 
@@ -124,6 +124,26 @@ impl<Y: Touching> WithContacts<Y> {
         self.modes.as_ref()
     }
 
+    /// The mode of contact `k`.
+    pub(super) fn mode(&self, k: usize) -> Mode {
+        get_or(self.modes.as_ref(), k, Mode::Open)
+    }
+
+    /// Direction of slip of contact `k` where the step began.
+    pub(super) fn slip_of(&self, k: usize) -> [Y::Scalar; 2] {
+        get_or(self.slip.as_ref(), k, [Y::Scalar::zero(); 2])
+    }
+
+    /// Force of contact `k`, after [`WithContacts::loads`].
+    pub(super) fn force(&self, k: usize) -> [Y::Scalar; 3] {
+        get_or(self.at.forces.as_ref(), k, [Y::Scalar::zero(); 3])
+    }
+
+    /// Whether contact `k` begins to slide.
+    fn begins(&self, k: usize) -> bool {
+        get_or(self.begins.as_ref(), k, false)
+    }
+
     /// Whether all contacts are open.
     pub(super) fn is_open(&self) -> bool {
         self.modes().iter().all(|mode| *mode == Mode::Open)
@@ -139,9 +159,9 @@ impl<Y: Touching> WithContacts<Y> {
 
     /// Sets the modes and the directions of slip.
     pub(super) fn set_modes(&mut self, found: &Touches<Y>) {
-        self.modes.as_mut().copy_from_slice(found.modes.as_ref());
-        self.slip.as_mut().copy_from_slice(found.slip.as_ref());
-        self.begins.as_mut().copy_from_slice(found.begins.as_ref());
+        copy(self.modes.as_mut(), found.modes.as_ref());
+        copy(self.slip.as_mut(), found.slip.as_ref());
+        copy(self.begins.as_mut(), found.begins.as_ref());
         self.modes_are_set();
     }
 
@@ -234,16 +254,16 @@ impl<Y: Touching> WithContacts<Y> {
 
     /// Whether contact `k` slides with friction, and does not just begin to.
     pub(super) fn slides_on(&self, k: usize) -> bool {
-        self.rubs(k) && !self.begins.as_ref()[k]
+        self.rubs(k) && !self.begins(k)
     }
 
     /// Direction of slip of contact `k` after [`WithContacts::look`]. Beyond the end of the motion along the direction
     /// where the step began, it is the mirror image: it does not jump within a step that leads too far.
     pub(super) fn direction(&self, k: usize) -> [Y::Scalar; 2] {
-        if self.begins.as_ref()[k] {
-            return self.slip.as_ref()[k];
+        if self.begins(k) {
+            return self.slip_of(k);
         }
-        let ([x, y], [a, b]) = (self.tangential(k), self.slip.as_ref()[k]);
+        let ([x, y], [a, b]) = (self.tangential(k), self.slip_of(k));
         let speed = (x * x + y * y).sqrt();
         if !(speed.to_f64() > SLOW) {
             return [a, b];
@@ -260,10 +280,11 @@ impl<Y: Touching> WithContacts<Y> {
         }
         self.look(t, q, p);
         for k in 0..self.modes.as_ref().len() {
-            let begins = self.begins.as_ref()[k];
-            self.begins.as_mut()[k] = begins && !(self.speed(k).to_f64() > CREEP);
+            let begins = self.begins(k) && !(self.speed(k).to_f64() > CREEP);
+            set(self.begins.as_mut(), k, begins);
             if self.rubs(k) {
-                self.slip.as_mut()[k] = self.direction(k);
+                let direction = self.direction(k);
+                set(self.slip.as_mut(), k, direction);
             }
         }
     }
@@ -274,16 +295,16 @@ impl<Y: Touching> WithContacts<Y> {
         let Some(mut instant) = self.instant.take() else { return };
         instant.take_closed(self);
         for i in 0..instant.count {
-            let k = instant.order()[i];
-            if self.rubs(k) && !self.begins.as_ref()[k] {
-                instant.problem.as_mut()[i].slip = Some(self.direction(k));
+            let k = instant.contact(i);
+            if self.slides_on(k) {
+                instant.set_slip(i, Some(self.direction(k)));
             }
         }
         self.near = instant.find_forces(self, t, q, Effort::default(), self.near).is_ok();
         if self.near {
             for i in 0..instant.count {
-                let k = instant.order()[i];
-                if self.begins.as_ref()[k] {
+                let k = instant.contact(i);
+                if self.begins(k) {
                     self.turn_slip(&instant, i, k);
                 }
             }
@@ -295,23 +316,23 @@ impl<Y: Touching> WithContacts<Y> {
     /// acceleration where its force is small, because others can take it over.
     fn turn_slip(&mut self, instant: &Touches<Y>, i: usize, k: usize) {
         let zero = Y::Scalar::zero();
-        let c = instant.problem.as_ref()[i].contact;
-        let f = &instant.impulses.as_ref()[..instant.rows()];
+        let c = instant.touch(i).contact;
+        let f = first(instant.impulses.as_ref(), instant.rows());
         let largest = f.iter().fold(zero, |most, x| if x.abs() > most { x.abs() } else { most });
-        let [n, mut x, mut y] = [f[c.row], -f[c.row + 1], -f[c.row + 2]];
+        let [n, mut x, mut y] = [get(f, c.row), -get(f, c.row + 1), -get(f, c.row + 2)];
         if !(n > Y::Scalar::constant(UNSURE) * largest) {
             (x, y) = (instant.acceleration(c.row + 1), instant.acceleration(c.row + 2));
         }
         let size = (x * x + y * y).sqrt();
         if size > zero {
-            self.slip.as_mut()[k] = [x / size, y / size];
+            set(self.slip.as_mut(), k, [x / size, y / size]);
         }
     }
 
     /// Whether contact `k` slides with friction.
     pub(super) fn rubs(&self, k: usize) -> bool {
         let c = self.contact(k);
-        self.modes.as_ref()[k] == Mode::Slide && c.tangents && c.friction > Y::Scalar::zero()
+        self.mode(k) == Mode::Slide && c.tangents && c.friction > Y::Scalar::zero()
     }
 
     /// Friction of contact `k` on the joints for a normal force of 1 N, in `self.unit`.
@@ -349,18 +370,18 @@ impl<Y: Touching> WithContacts<Y> {
         for k in 0..count {
             let c = self.contact(k);
             let lambda = self.at.lambda.as_ref();
-            let own = |row: usize, acts: bool| if acts { -lambda[row] } else { zero };
-            let mode = self.modes.as_ref()[k];
+            let own = |row: usize, acts: bool| if acts { -get(lambda, row) } else { zero };
+            let mode = self.mode(k);
             let mut force = [zero; 3];
             for (i, force) in force.iter_mut().enumerate().take(c.rows()) {
                 *force = own(c.row + i, mode.acts(i));
             }
             if self.rubs(k) {
-                let normal = if all { force[0] } else { self.table.as_ref()[k * (count + 1) + count] };
+                let normal = if all { force[0] } else { get(self.table.as_ref(), k * (count + 1) + count) };
                 let [a, b] = self.direction(k);
                 force = [normal, -(c.friction * normal * a), -(c.friction * normal * b)];
             }
-            self.at.forces.as_mut()[k] = force;
+            set(self.at.forces.as_mut(), k, force);
         }
     }
 
@@ -375,14 +396,14 @@ impl<Y: Touching> WithContacts<Y> {
             lambda.fill(zero);
             for (line, force) in lines(&self.system, instant.sharing()).zip(instant.impulses.as_ref()) {
                 for (i, (row, force)) in line.forces(*force).enumerate() {
-                    lambda[row] = -force;
+                    set(lambda, row, -force);
                     if i > 0 {
                         add_row(&self.system, &self.at.entries, row, force, friction);
                     }
                 }
             }
             for (force, c) in self.at.forces.as_mut().iter_mut().zip(self.system.contacts()) {
-                *force = core::array::from_fn(|i| if i < c.rows() { -lambda[c.row + i] } else { zero });
+                *force = core::array::from_fn(|i| if i < c.rows() { -get(lambda, c.row + i) } else { zero });
             }
         }
         self.instant = Some(instant);
@@ -412,16 +433,17 @@ impl<Y: Touching> WithContacts<Y> {
                 if !self.rubs(j) {
                     continue;
                 }
-                let response = -self.sigma.as_ref()[self.contact(j).row];
-                self.table.as_mut()[j * width + k] = if j == k { one - response } else { -response };
+                let response = -get(self.sigma.as_ref(), self.contact(j).row);
+                set(self.table.as_mut(), j * width + k, if j == k { one - response } else { -response });
             }
-            self.table.as_mut()[k * width + count] = -self.at.lambda.as_ref()[self.contact(k).row];
+            let free = -get(self.at.lambda.as_ref(), self.contact(k).row);
+            set(self.table.as_mut(), k * width + count, free);
         }
         self.eliminate(count);
         for k in 0..count {
             if self.rubs(k) {
                 self.unit_friction(k);
-                let normal = self.table.as_ref()[k * width + count];
+                let normal = get(self.table.as_ref(), k * width + count);
                 for (sum, unit) in self.friction.as_mut().iter_mut().zip(self.unit.as_ref()) {
                     *sum = *sum + normal * *unit;
                 }
@@ -436,22 +458,24 @@ impl<Y: Touching> WithContacts<Y> {
             if !self.rubs(k) {
                 continue;
             }
-            let pivot = self.table.as_ref()[k * width + k];
+            let pivot = get(self.table.as_ref(), k * width + k);
             for j in 0..count {
                 if j == k || !self.rubs(j) {
                     continue;
                 }
                 let table = self.table.as_mut();
-                let factor = table[j * width + k] / pivot;
+                let factor = get(table, j * width + k) / pivot;
                 for i in k..width {
-                    table[j * width + i] = table[j * width + i] - factor * table[k * width + i];
+                    let left = get(table, j * width + i) - factor * get(table, k * width + i);
+                    set(table, j * width + i, left);
                 }
             }
         }
         for k in 0..count {
             if self.rubs(k) {
                 let table = self.table.as_mut();
-                table[k * width + count] = table[k * width + count] / table[k * width + k];
+                let normal = get(table, k * width + count) / get(table, k * width + k);
+                set(table, k * width + count, normal);
             }
         }
     }

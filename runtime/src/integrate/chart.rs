@@ -17,6 +17,7 @@ use super::combine::{combine, Start};
 use super::lie_joint::normalise;
 use super::StepError;
 use crate::constant::Constant;
+use crate::lists::{copy, part, part_mut};
 use crate::system::{LieJoint, Real, System};
 use crate::Scalar;
 
@@ -168,7 +169,7 @@ where
         }
         for group in system.lie_joints() {
             if let Some(index) = group.quaternion() {
-                let norm = normalise(&mut self.q.as_mut()[index..index + 4]).to_f64();
+                let norm = normalise(part_mut(self.q.as_mut(), index, 4)).to_f64();
                 if !(norm > 0.999 && norm < 1.001) {
                     return Err(StepError::Quaternion { time, index, norm });
                 }
@@ -202,8 +203,8 @@ where
         out.clear();
         let (q, x) = (self.q.as_ref(), out.x.as_mut());
         for (at, v, n, _) in Stretches::new(system.lie_joints(), q.len(), x.len()) {
-            for k in 0..n {
-                x[v + k] = q[at + k].abs();
+            for (x, q) in part_mut(x, v, n).iter_mut().zip(part(q, at, n)) {
+                *x = q.abs();
             }
         }
         for (size, p) in out.p.as_mut().iter_mut().zip(self.p.as_ref()) {
@@ -222,7 +223,7 @@ where
             return displaced(base, x, cx, q);
         }
         for (at, v, n, group) in Stretches::new(system.lie_joints(), base.len(), x.len()) {
-            displaced(&base[at..at + n], &x[v..v + n], cx.map(|c| &c[v..v + n]), &mut q[at..at + n]);
+            displaced(part(base, at, n), part(x, v, n), cx.map(|c| part(c, v, n)), part_mut(q, at, n));
             if let Some(group) = group {
                 group.displace(base, x, q);
                 group.inward(q, group.shift(x), p.as_mut());
@@ -258,10 +259,10 @@ where
     ) {
         let (xd, qd_) = (out.x.as_mut(), qd.as_ref());
         if system.lie_joints().is_empty() {
-            return xd.copy_from_slice(qd_);
+            return copy(xd, qd_);
         }
         for (at, v, n, group) in Stretches::new(system.lie_joints(), qd_.len(), xd.len()) {
-            xd[v..v + n].copy_from_slice(&qd_[at..at + n]);
+            copy(part_mut(xd, v, n), part(qd_, at, n));
             if let Some(group) = group {
                 group.rates(point.x.as_ref(), (q.as_ref(), p.as_ref()), qd_, xd, out.p.as_mut());
             }
@@ -279,12 +280,13 @@ where
         for group in system.lie_joints() {
             let (from, n) = (group.v, group.kind.sizes().1);
             let mut p = [Y::Scalar::zero(); 6];
-            for (k, p) in p.iter_mut().enumerate().take(n) {
-                *p = self.p.as_ref()[from + k] + point.p.as_ref()[from + k];
+            let both = part(self.p.as_ref(), from, n).iter().zip(part(point.p.as_ref(), from, n));
+            for (p, (base, dp)) in p.iter_mut().zip(both) {
+                *p = *base + *dp;
             }
-            let part = from..from + n;
             let group = LieJoint { v: 0, ..*group };
-            group.gradient(&point.x.as_ref()[part.clone()], &p, &mut gx[part.clone()], &mut gp[part]);
+            let x = part(point.x.as_ref(), from, n);
+            group.gradient(x, &p, part_mut(gx, from, n), part_mut(gp, from, n));
         }
     }
 
@@ -299,8 +301,8 @@ where
         let (q, x) = (self.q.as_mut(), point.x.as_ref());
         let mut carry = self.carry.as_mut().map(|c| (c.x.as_mut(), c.p.as_mut()));
         for (at, v, n, group) in Stretches::new(system.lie_joints(), q.len(), x.len()) {
-            for k in 0..n {
-                sum(&mut q[at + k], x[v + k], carry.as_mut().map(|c| &mut c.0[v + k]));
+            for (k, (q, x)) in part_mut(q, at, n).iter_mut().zip(part(x, v, n)).enumerate() {
+                sum(q, *x, carry.as_mut().and_then(|c| c.0.get_mut(v + k)));
             }
             if let Some(group) = group {
                 group.advance(x, q);
@@ -308,7 +310,7 @@ where
         }
         let p = self.p.as_mut();
         for (k, (p, dp)) in p.iter_mut().zip(point.p.as_ref()).enumerate() {
-            sum(p, *dp, carry.as_mut().map(|c| &mut c.1[k]));
+            sum(p, *dp, carry.as_mut().and_then(|c| c.1.get_mut(k)));
         }
         for group in system.lie_joints() {
             group.refer(group.shift(x), p);
@@ -353,11 +355,12 @@ where
         for (at, v, n, group) in Stretches::new(system.lie_joints(), q0.len(), x.len()) {
             let positions = group.map_or(0, |group| group.kind.positions());
             let before = group.map_or([Y::Scalar::zero(); 3], |group| group.shift(x));
-            for k in 0..n {
-                x[v + k] = x[v + k] + (q1[at + k] - q0[at + k]);
+            for (x, (q1, q0)) in part_mut(x, v, n).iter_mut().zip(part(q1, at, n).iter().zip(part(q0, at, n))) {
+                *x = *x + (*q1 - *q0);
             }
-            for k in v..v + n - positions {
-                p[k] = p[k] + (p1[k] - p0[k]);
+            let n = n - positions;
+            for (p, (p1, p0)) in part_mut(p, v, n).iter_mut().zip(part(p1, v, n).iter().zip(part(p0, v, n))) {
+                *p = *p + (*p1 - *p0);
             }
             if let Some(group) = group {
                 group.correct((q0, p0), (q1, p1), before, (x, p));
@@ -371,7 +374,7 @@ where
         for group in system.lie_joints() {
             group.compose((step.x.as_ref(), step.p.as_ref()), x, p);
         }
-        for_positions(system, x.len(), |k| x[k] = x[k] + step.x.as_ref()[k]);
+        for_positions(system, x, step.x.as_ref(), |x, step| x + step);
         for (sum, dp) in p.iter_mut().zip(step.p.as_ref()) {
             *sum = *sum + *dp;
         }
@@ -387,7 +390,7 @@ where
         for group in system.lie_joints() {
             group.relative(step.x.as_ref(), x, p);
         }
-        for_positions(system, x.len(), |k| x[k] = x[k] - step.x.as_ref()[k]);
+        for_positions(system, x, step.x.as_ref(), |x, step| x - step);
     }
 
     /// What a past point of the motion, `x` from the chart's state, and its rate become when the chart's state is moved
@@ -397,16 +400,24 @@ where
         for group in system.lie_joints() {
             group.follow(step, x, rate.x.as_mut(), rate.p.as_mut());
         }
-        for_positions(system, x.len(), |k| x[k] = x[k] - step[k]);
+        for_positions(system, x, step, |x, step| x - step);
     }
 }
 
-/// The components, of `nv`, that displacements are added to.
+/// Combines the components of `x` that displacements are added to with those of `step`.
 #[inline]
-fn for_positions<Y: System>(system: &Y, nv: usize, mut with: impl FnMut(usize)) {
+fn for_positions<Y: System>(
+    system: &Y,
+    x: &mut [Y::Scalar],
+    step: &[Y::Scalar],
+    with: impl Fn(Y::Scalar, Y::Scalar) -> Y::Scalar,
+) {
+    let nv = x.len();
     let nq = system.lie_joints().iter().fold(nv, |n, g| n + g.kind.sizes().0 - g.kind.sizes().1);
     for (_, v, n, _) in Stretches::new(system.lie_joints(), nq, nv) {
-        (v..v + n).for_each(&mut with);
+        for (x, step) in part_mut(x, v, n).iter_mut().zip(part(step, v, n)) {
+            *x = with(*x, *step);
+        }
     }
 }
 

@@ -414,7 +414,9 @@ where
             *scale = allowed(tolerances.coordinates, size.to_f64(), most_x);
         }
         for group in system.lie_joints() {
-            self.scale.x.as_mut()[group.rotations()].fill(part(tolerances.rotations, 1.0));
+            if let Some(rotations) = self.scale.x.as_mut().get_mut(group.rotations()) {
+                rotations.fill(part(tolerances.rotations, 1.0));
+            }
         }
         let full = tolerances.control == Control::Full;
         for (scale, size) in self.scale.p.as_mut().iter_mut().zip(self.size.p.as_ref()) {

@@ -161,7 +161,7 @@ where
     print_line("ticks", ticks.into());
     print_line("steps", end.steps.into());
     print_line("evaluations", end.evaluations);
-    for (name, x) in ["costliest", "touched"].into_iter().zip(end.contacts.into_iter().flatten()) {
+    for (name, x) in ["costliest", "touched", "event"].into_iter().zip(end.contacts.into_iter().flatten()) {
         print_line(name, x);
     }
     exit(!wrapped)

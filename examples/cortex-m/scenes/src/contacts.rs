@@ -1,6 +1,9 @@
-//! Mechanisms that touch the floor: time steps of Moreau's midpoint rule, with a fixed number of sweeps for the impulses.
+//! Mechanisms that touch the floor: time steps of Moreau's midpoint rule, with a fixed number of sweeps for the impulses, and
+//! a motion from event to event.
 
-use mbd_runtime::contact::{TimeStepping, Touching, WithContacts};
+use mbd_runtime::constrained::{Projection, WithPostStep};
+use mbd_runtime::contact::{Cause, Hybrid, TimeStepping, Touching, WithContacts};
+use mbd_runtime::integrate::{Step, Tolerances, Tsit5};
 use mbd_runtime::{Energetic, Scalar};
 
 use crate::{End, Unusable};
@@ -16,6 +19,12 @@ mbd_macros::mbd_model! {
     name = HopperF64,
     scalar = f64,
     modes = ["open open open"]
+}
+mbd_macros::mbd_model! {
+    path = "../../../models/contacts/hopper.toml",
+    name = HopperEventsF64,
+    scalar = f64,
+    modes = ["open open open", "slide open open"]
 }
 mbd_macros::mbd_model! {
     path = "../leg.toml",
@@ -45,12 +54,66 @@ pub fn hopping<Y>(system: &mut Y, now: impl Fn() -> u32) -> Result<End<Y>, Unusa
 where
     Y: Touching + Energetic + Clone,
 {
+    let start = start_of_hopper(system);
+    stepped(system, start, now, |_, _, _| ())
+}
+
+/// The hopper at rest, 0.3 m above the floor.
+fn start_of_hopper<Y: Touching>(system: &Y) -> (Y::Coordinates, Y::Momenta) {
     let mut q = system.neutral();
     for (q, start) in q.as_mut().iter_mut().zip(HopperF64::START) {
         *q = Y::Scalar::constant(start);
     }
-    let p = system.zero_momenta();
-    stepped(system, (q, p), now, |_, _, _| ())
+    (q, system.zero_momenta())
+}
+
+/// Seconds of the hopper's motion by events, error allowed in a step, and the number of steps in which it must end.
+const TIME: f64 = 2.0;
+const TOLERANCE: f64 = 1e-8;
+const MOST: u32 = 10_000;
+
+/// The same two seconds from event to event: steps of any length, cut where a contact closes or opens. Both
+/// must have happened, or the run fails.
+///
+/// # Errors
+/// [`Unusable`].
+pub fn hopping_by_events<Y>(system: &mut Y, now: impl Fn() -> u32) -> Result<End<Y>, Unusable>
+where
+    Y: Touching<Scalar = f64> + Energetic + Clone,
+{
+    let (mut q, mut p) = start_of_hopper(system);
+    let mut system = WithContacts::new(system.clone());
+    let projection = Projection::fixed_work::<1>(&system);
+    let method = WithPostStep::new(&system, Tsit5::new(&system), projection);
+    let step = Step::Adaptive(Tolerances::new(TOLERANCE));
+    let mut motion = Hybrid::new(&mut system, method, step, 0.0, &q, &p).map_err(|_| Unusable(0))?;
+    let (mut steps, mut landed, mut left) = (0, 0_u64, 0_u64);
+    let mut costliest = [0; 2];
+    while motion.time() < TIME && steps < MOST {
+        let start = now();
+        let event = motion.advance(&mut system, TIME, &mut ()).map_err(|_| Unusable(steps))?;
+        let ticks = now().wrapping_sub(start);
+        steps += 1;
+        let [quiet, eventful] = &mut costliest;
+        let most = if event.is_some() { eventful } else { quiet };
+        *most = ticks.max(*most);
+        match event.map(|event| event.cause) {
+            Some(Cause::Landed) => landed += 1,
+            Some(Cause::Unloaded) => left += 1,
+            _ => (),
+        }
+    }
+    if steps == MOST || landed == 0 || left == 0 {
+        return Err(Unusable(steps));
+    }
+    motion.state(&system, &mut q, &mut p);
+    let (kinetic, potential) = system.energies(&q, &p);
+    let statistics = motion.contact_statistics();
+    let energy = Some([kinetic + potential, statistics.lost, statistics.residual]);
+    let evaluations = motion.statistics().evaluations;
+    let [costliest, event] = costliest;
+    let contacts = Some([costliest.into(), landed + left, event.into()]);
+    Ok(End { q, p, energy, steps, evaluations, contacts })
 }
 
 /// A leg with motors at hip and knee.
@@ -141,5 +204,5 @@ where
     let (kinetic, potential) = system.energies(&q, &p);
     let energy = Some([kinetic + potential, statistics.lost, statistics.overlap]);
     let evaluations = u64::from(STEPS * RATES);
-    Ok(End { q, p, energy, steps: STEPS, evaluations, contacts: Some([costliest.into(), touched]) })
+    Ok(End { q, p, energy, steps: STEPS, evaluations, contacts: Some([costliest.into(), touched, 0]) })
 }

@@ -48,7 +48,7 @@ mbd_macros::mbd_model! {
 mod contacts;
 mod mpc;
 
-pub use contacts::{hopping, leg, HopperF32, HopperF64, LegF32, LegF64};
+pub use contacts::{hopping, hopping_by_events, leg, HopperEventsF64, HopperF32, HopperF64, LegF32, LegF64};
 
 /// Number of steps of the short runs.
 pub const STEPS: u32 = 1000;
@@ -73,8 +73,9 @@ pub struct End<Y: System> {
     pub steps: u32,
     /// Number of evaluations of the dynamics.
     pub evaluations: u64,
-    /// Of runs with contacts: ticks of the clock that the costliest step took, and steps with impulses.
-    pub contacts: Option<[u64; 2]>,
+    /// Of runs with contacts: ticks of the clock that the costliest step without an event took, steps with impulses or
+    /// events, and ticks of the costliest step with an event; zero where the run takes time steps.
+    pub contacts: Option<[u64; 3]>,
 }
 
 /// Error: the number of the step after which the state is unusable. (The integrator's own error contains the time as a
@@ -317,6 +318,7 @@ macro_rules! each_scene {
         $what!(acrobot_mpc_f32, $crate::DoublePendulumF32, $crate::swing_up);
         $what!(hopper_f32, $crate::HopperF32, |system: &mut _| $crate::hopping(system, || 0));
         $what!(hopper_f64, $crate::HopperF64, |system: &mut _| $crate::hopping(system, || 0));
+        $what!(hopper_events_f64, $crate::HopperEventsF64, |system: &mut _| $crate::hopping_by_events(system, || 0));
         $what!(leg_f32, $crate::LegF32, |system: &mut _| $crate::leg(system, || 0));
         $what!(leg_f64, $crate::LegF64, |system: &mut _| $crate::leg(system, || 0));
     };

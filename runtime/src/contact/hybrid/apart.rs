@@ -57,7 +57,8 @@ where
 
     /// Whether a contact that is open is ignored, or cannot have closed in the last step, by its gap at the end.
     pub(super) fn is_far(&self, k: usize) -> bool {
-        self.ignored.as_ref()[k] || self.end.as_ref()[k].first > self.travel.as_ref()[k]
+        let (end, travel) = (self.end.as_ref().get(k), self.travel.as_ref().get(k));
+        self.ignores(k) || end.zip(travel).is_some_and(|(end, travel)| end.first > *travel)
     }
 
     /// How far bodies whose contacts may have changed in the last step turn in it, in units of the angle within which
@@ -66,7 +67,7 @@ where
         let all_open = system.is_open();
         let mut most: Option<f64> = None;
         for (k, (a, b)) in self.left.as_ref().iter().zip(self.end.as_ref()).enumerate() {
-            if system.modes()[k] == Mode::Open && self.is_far(k) {
+            if system.mode(k) == Mode::Open && self.is_far(k) {
                 continue;
             }
             let turn = h.to_f64().abs() * a.turning.to_f64().max(b.turning.to_f64()) / TURN;

@@ -17,6 +17,7 @@ use super::Way;
 use super::{ContactError, Effort, Impact, ImpactOrder, Mode, RegimeChange, Touching, WithContacts};
 use crate::error::StepError;
 use crate::integrate::{Limits, Solver, Statistics, Step, Stepper};
+use crate::lists::get_or;
 use crate::system::Real;
 use crate::Scalar;
 use watch::Watched;
@@ -254,6 +255,10 @@ struct Departure<S> {
 /// cut there, impulses and modes are computed, and the motion starts again. A gap counts as zero where it touches zero
 /// within a step too, which its rate tells. While all contacts are open, gaps are not looked at before the joints have
 /// moved so far that one of them may have closed ([`Touching::reaches`]).
+///
+/// While contacts are closed, momenta collect their multipliers, and a contact that opens would make velocities of them. So
+/// the method has to free them of these at the ends of steps: [`WithPostStep`](crate::constrained::WithPostStep) with a
+/// [`Projection`](crate::constrained::Projection).
 #[derive(Clone, Debug)]
 pub struct Hybrid<Y: Touching, M> {
     solver: Solver<WithContacts<Y>, M>,
@@ -488,7 +493,9 @@ where
         solver.state(system, &mut start.1, &mut start.2);
         system.note_slip(start.0, &start.1, &start.2);
         solver.advance(system, t_end)?;
-        self.statistics.steps[system.system().way() as usize] += 1;
+        if let Some(steps) = self.statistics.steps.get_mut(system.system().way() as usize) {
+            *steps += 1;
+        }
         let found = self.first_event(system)?;
         let end = found.map_or(Y::Scalar::one(), |found| found.theta);
         observer.stretch(system, &mut LastStep { solver: &mut self.solver, end });
@@ -517,6 +524,11 @@ where
             solver.limits.first_step = 2.0 * h.to_f64();
         }
         Ok(())
+    }
+
+    /// Whether contact `k` is left open whatever its gap is.
+    fn ignores(&self, k: usize) -> bool {
+        get_or(self.ignored.as_ref(), k, false)
     }
 
     fn count(&self, system: &WithContacts<Y>) -> usize {

@@ -3,8 +3,9 @@
 use super::watch::Found;
 use super::{Cause, ContactEvent, Departure, Hybrid, HybridError};
 use crate::contact::with_contacts::CREEP;
-use crate::contact::{impact, Impact, ImpactOptions, Mode, Touching, WithContacts};
+use crate::contact::{impact, Impact, ImpactOptions, Mode, Touch, Touching, WithContacts};
 use crate::integrate::Stepper;
+use crate::lists::{copy, first, get, get_or, set};
 use crate::system::Real;
 use crate::Scalar;
 
@@ -31,7 +32,7 @@ where
     ) -> Result<Option<ContactEvent<Y::Scalar>>, HybridError> {
         self.crowd(t)?;
         let switches = self.statistics.switches;
-        let before = system.modes()[found.contact];
+        let before = system.mode(found.contact);
         let mut event = ContactEvent {
             time: t,
             contact: found.contact,
@@ -46,10 +47,10 @@ where
             system.loads(t, &self.q, true);
         }
         let own = !system.redundant || system.shares() || found.cause == Cause::Stopped;
-        self.forced = own.then(|| (found.contact, found.cause, system.at.forces.as_ref()[found.contact]));
+        self.forced = own.then(|| (found.contact, found.cause, system.force(found.contact)));
         self.settle_modes(system, t, Some(&mut event))?;
         self.forced = None;
-        event.modes[1] = system.modes()[found.contact];
+        event.modes = [before, system.mode(found.contact)];
         // Forces of redundant contacts may have been redistributed, and nothing else.
         let happened = event.impact.is_some() || event.cause == Cause::Stopped || self.statistics.switches > switches;
         self.statistics.events += u64::from(happened);
@@ -80,7 +81,7 @@ where
         let event = self.collide(system, t, event)?;
         self.stay(system, t, event.as_ref().map(|impact| impact.energy));
         self.select(system, t)?;
-        self.before.as_mut().copy_from_slice(system.modes());
+        copy(self.before.as_mut(), system.modes());
         self.take_modes(system, t);
         let changed = self.before.as_ref().iter().zip(system.modes()).filter(|(old, new)| old != new);
         self.statistics.switches += changed.count() as u64;
@@ -100,8 +101,8 @@ where
     fn take_touching(&mut self, system: &WithContacts<Y>) {
         self.touching.count = 0;
         for k in 0..self.count(system) {
-            let near = system.gap(k).to_f64() <= self.rules.touching && !self.ignored.as_ref()[k];
-            if system.modes()[k] != Mode::Open || near {
+            let near = system.gap(k).to_f64() <= self.rules.touching && !self.ignores(k);
+            if system.mode(k) != Mode::Open || near {
                 self.touching.take(system, k);
             }
         }
@@ -131,10 +132,10 @@ where
         let touching = &mut self.touching;
         touching.assemble(system, t, &self.q);
         let mut i = 0;
-        for &k in &touching.order.as_ref()[..touching.count] {
+        for &k in first(touching.order.as_ref(), touching.count) {
             let c = system.contact(k);
             for row in c.row..c.row + c.rows() {
-                touching.b.as_mut()[i] = system.at.velocities.as_ref()[row];
+                set(touching.b.as_mut(), i, get(system.at.velocities.as_ref(), row));
                 i += 1;
             }
         }
@@ -144,7 +145,7 @@ where
         let result = impact(&problem, &options, impulses, work)
             .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
         system.kick(touching.order(), touching.impulses.as_ref());
-        self.p.as_mut().copy_from_slice(system.p.as_ref());
+        copy(self.p.as_mut(), system.p.as_ref());
         self.note(&result);
         if let Some(event) = event {
             event.approach = -system.gap_rate(event.contact);
@@ -171,16 +172,16 @@ where
         let mut rest = None;
         self.settling = zero;
         for i in 0..self.touching.count {
-            let k = self.touching.order()[i];
-            let Departure { time, speed } = self.departures.as_ref()[k];
+            let k = self.touching.contact(i);
+            let Departure { time, speed } = get_or(self.departures.as_ref(), k, Departure { time: t, speed: zero });
             let approach = -system.gap_rate(k);
-            let lands = system.modes()[k] == Mode::Open && approach.to_f64() > APPROACH;
+            let lands = system.mode(k) == Mode::Open && approach.to_f64() > APPROACH;
             if !(lands && speed > zero && t > time) {
                 continue;
             }
             // The bodies have come back with about the speed with which they departed.
             let acceleration = (speed + approach) / (t - time);
-            let contact = &mut self.touching.problem.as_mut()[i].contact;
+            let Some(Touch { contact, .. }) = self.touching.problem.as_mut().get_mut(i) else { continue };
             let e = contact.restitution;
             // The bounce that would follow.
             let height = e * approach * (e * approach) / (two * acceleration);
@@ -188,7 +189,7 @@ where
                 continue;
             }
             contact.restitution = zero;
-            self.touching.settles.as_mut()[k] = true;
+            set(self.touching.settles.as_mut(), k, true);
             self.settling = acceleration;
             self.statistics.settled += 1;
             rest = Some(if e < one { t + two * e * approach / (acceleration * (one - e)) } else { t });
@@ -201,7 +202,7 @@ where
         let zero = Y::Scalar::zero();
         let taken = self.touching.count;
         let fastest = (0..taken).fold(zero, |most, i| {
-            let rate = system.gap_rate(self.touching.order()[i]).abs();
+            let rate = system.gap_rate(self.touching.contact(i)).abs();
             if rate > most {
                 rate
             } else {
@@ -212,14 +213,14 @@ where
         self.touching.count = 0;
         // What is kept takes the place of what was before it.
         for i in 0..taken {
-            let k = self.touching.order.as_ref()[i];
+            let k = get_or(self.touching.order.as_ref(), i, usize::MAX);
             let rate = system.gap_rate(k);
             // Where bounces of one contact are followed no longer, those of others that it throws up are not either.
             let height = rate * rate / (self.settling + self.settling);
-            let settles = self.touching.settles.as_ref()[k] || height.to_f64() < self.rules.bounce;
+            let settles = get_or(self.touching.settles.as_ref(), k, false) || height.to_f64() < self.rules.bounce;
             let departs = rate.to_f64() > slow && !settles;
             if departs && impact.is_some() {
-                self.departures.as_mut()[k] = Departure { time: t, speed: rate };
+                set(self.departures.as_mut(), k, Departure { time: t, speed: rate });
             }
             if !departs {
                 self.touching.take(system, k);
@@ -231,8 +232,8 @@ where
     pub(super) fn has_redundant_rows(&mut self, system: &mut WithContacts<Y>) -> bool {
         let rows = self.touching.rows();
         let a = self.touching.a.as_ref();
-        let most =
-            (0..rows).fold(Y::Scalar::zero(), |most, i| if a[i * rows + i] > most { a[i * rows + i] } else { most });
+        let own = |i: usize| get(a, i * rows + i);
+        let most = (0..rows).fold(Y::Scalar::zero(), |most, i| if own(i) > most { own(i) } else { most });
         let least = Y::Scalar::constant(1e-12) * most;
         system.find_pivots(&self.q);
         let independent = system.sigma.as_ref().iter().filter(|pivot| **pivot != Y::Scalar::zero()).count();
@@ -240,10 +241,10 @@ where
         let mut i = 0;
         let mut redundant = false;
         for &k in self.touching.order() {
-            let (c, mode) = (system.contact(k), system.modes()[k]);
+            let (c, mode) = (system.contact(k), system.mode(k));
             for j in 0..c.rows() {
-                let left_out = system.sigma.as_ref()[c.row + j] == Y::Scalar::zero();
-                redundant |= mode.acts(j) && left_out && a[i * rows + i] > least;
+                let left_out = get(system.sigma.as_ref(), c.row + j) == Y::Scalar::zero();
+                redundant |= mode.acts(j) && left_out && own(i) > least;
                 i += 1;
             }
         }

@@ -4,6 +4,7 @@ use super::{Cause, Hybrid, HybridError};
 use crate::contact::with_contacts::CREEP;
 use crate::contact::{Mode, Touch, Touching, WithContacts};
 use crate::integrate::Stepper;
+use crate::lists::{copy, first, get, set};
 use crate::system::Real;
 use crate::Scalar;
 
@@ -45,7 +46,7 @@ where
         let stops = self.touching.order().iter().any(stops);
         let least = if stops { TOGETHER * self.rules.slip } else { self.rules.slip };
         for i in 0..self.touching.count {
-            let k = self.touching.order()[i];
+            let k = self.touching.contact(i);
             let [x, y] = system.tangential(k);
             let speed = (x * x + y * y).sqrt();
             let slides = speed.to_f64() > least;
@@ -59,7 +60,7 @@ where
                 Some((contact, Cause::Stopped, _)) if contact == k && speed.to_f64() < CREEP => None,
                 _ => slides.then(|| [x / speed, y / speed]),
             };
-            self.touching.problem.as_mut()[i].slip = slip;
+            self.touching.set_slip(i, slip);
         }
     }
 
@@ -68,38 +69,40 @@ where
         let zero = Y::Scalar::zero();
         let touching = &mut self.touching;
         let rows = touching.rows();
-        let size =
-            |list: &[Y::Scalar]| list[..rows].iter().fold(zero, |most, x| if x.abs() > most { x.abs() } else { most });
+        let size = |list: &[Y::Scalar]| {
+            first(list, rows).iter().fold(zero, |most, x| if x.abs() > most { x.abs() } else { most })
+        };
         let small = Y::Scalar::constant(SMALL);
         let (still, unloaded) = (small * size(touching.b.as_ref()), small * size(touching.impulses.as_ref()));
         for i in 0..touching.count {
-            let k = touching.order()[i];
-            let Touch { contact: c, slip } = touching.problem.as_ref()[i];
+            let k = touching.contact(i);
+            let Touch { contact: c, slip } = touching.touch(i);
             let cause = self.forced.filter(|(contact, ..)| *contact == k).map(|(_, cause, _)| cause);
             // Where the force has just gone to zero, the acceleration starts from zero too.
             let released = cause == Some(Cause::Unloaded);
-            if touching.impulses.as_ref()[c.row] <= unloaded && (released || touching.acceleration(c.row) > still) {
+            if get(touching.impulses.as_ref(), c.row) <= unloaded && (released || touching.acceleration(c.row) > still)
+            {
                 continue;
             }
-            touching.modes.as_mut()[k] = Mode::Slide;
+            set(touching.modes.as_mut(), k, Mode::Slide);
             if !c.tangents || !(c.friction > zero) {
                 continue;
             }
             if let Some(direction) = slip {
-                touching.slip.as_mut()[k] = direction;
-                touching.begins.as_mut()[k] = cause == Some(Cause::Slipped);
+                set(touching.slip.as_mut(), k, direction);
+                set(touching.begins.as_mut(), k, cause == Some(Cause::Slipped));
                 continue;
             }
             let [x, y] = [touching.acceleration(c.row + 1), touching.acceleration(c.row + 2)];
             let along = (x * x + y * y).sqrt();
             if along > still {
-                touching.slip.as_mut()[k] = [x / along, y / along];
-                touching.begins.as_mut()[k] = true;
+                set(touching.slip.as_mut(), k, [x / along, y / along]);
+                set(touching.begins.as_mut(), k, true);
                 if along > self.slipping {
                     self.slipping = along;
                 }
             } else {
-                touching.modes.as_mut()[k] = Mode::Stick;
+                set(touching.modes.as_mut(), k, Mode::Stick);
             }
         }
     }
@@ -117,7 +120,7 @@ where
         loop {
             system.set_modes(&self.touching);
             system.look(t, &self.q, &self.p);
-            self.p.as_mut().copy_from_slice(system.p.as_ref());
+            copy(self.p.as_mut(), system.p.as_ref());
             system.redundant = self.has_redundant_rows(system);
             if !system.shares() {
                 return;
@@ -126,14 +129,14 @@ where
             system.loads(t, &self.q, true);
             let forces = system.at.forces.as_ref();
             let largest = forces.iter().fold(zero, |most, [n, ..]| if *n > most { *n } else { most });
-            let closed = (0..forces.len()).filter(|k| system.modes()[*k] != Mode::Open);
-            let least = closed.fold(None, |least: Option<usize>, k| match least {
-                Some(other) if !(forces[k][0] < forces[other][0]) => Some(other),
-                _ => Some(k),
+            let closed = forces.iter().zip(system.modes()).enumerate().filter(|(_, (_, mode))| **mode != Mode::Open);
+            let least = closed.fold(None, |least: Option<(usize, Y::Scalar)>, (k, ([n, ..], _))| match least {
+                Some(other) if !(*n < other.1) => Some(other),
+                _ => Some((k, *n)),
             });
-            let Some(k) = least.filter(|k| forces[*k][0] <= Y::Scalar::constant(SMALL) * largest) else { return };
-            self.touching.modes.as_mut()[k] = Mode::Open;
-            self.touching.begins.as_mut()[k] = false;
+            let Some((k, _)) = least.filter(|(_, n)| *n <= Y::Scalar::constant(SMALL) * largest) else { return };
+            set(self.touching.modes.as_mut(), k, Mode::Open);
+            set(self.touching.begins.as_mut(), k, false);
         }
     }
 }

@@ -4,6 +4,7 @@ use super::{Cause, Hybrid, HybridError};
 use crate::contact::{Mode, Touching, WithContacts};
 use crate::integrate::root::{resolution, root};
 use crate::integrate::Stepper;
+use crate::lists::{copy, get_or};
 use crate::system::Real;
 use crate::Scalar;
 
@@ -113,7 +114,7 @@ where
         let (t, h) = self.solver.last_step();
         self.solver.dense(system, theta, &mut self.q, &mut self.p);
         system.look(t + theta * h, &self.q, &self.p);
-        if system.modes()[k] != Mode::Open {
+        if system.mode(k) != Mode::Open {
             system.loads(t + theta * h, &self.q, true);
         }
         of(&system.watched(k))
@@ -136,13 +137,13 @@ where
         self.sample(system, one, true);
         self.rests = system.at_rest();
         // The last stretch ends there too.
-        self.end.as_mut().copy_from_slice(self.right.as_ref());
+        copy(self.end.as_mut(), self.right.as_ref());
         self.travel_with_end(system);
         let (t, h) = self.solver.last_step();
         if !known && !(0..self.count(system)).all(|k| self.is_far(k)) {
             let Hybrid { start, q, p, .. } = self;
-            q.as_mut().copy_from_slice(start.1.as_ref());
-            p.as_mut().copy_from_slice(start.2.as_ref());
+            copy(q.as_mut(), start.1.as_ref());
+            copy(p.as_mut(), start.2.as_ref());
             self.evaluate(system, t, false);
         }
         let Some(turn) = self.turn_of_near(system, h) else {
@@ -160,7 +161,7 @@ where
             if j < stretches {
                 self.sample(system, to, true);
             } else {
-                self.right.as_mut().copy_from_slice(self.end.as_ref());
+                copy(self.right.as_mut(), self.end.as_ref());
             }
             let mut first: Option<Found<Y::Scalar>> = None;
             for k in 0..self.left.as_ref().len() {
@@ -190,7 +191,7 @@ where
     /// [`Hybrid::first_event`] has evaluated the last stretch.
     fn creeps(&self, system: &WithContacts<Y>) -> Option<usize> {
         (0..self.count(system)).find(|&k| {
-            let [before, now] = [&self.right, &self.left].map(|at| at.as_ref()[k]);
+            let [before, now] = [&self.right, &self.left].map(|at| get_or(at.as_ref(), k, Watched::zero()));
             let slow = now.speed.to_f64() < STANDSTILL && now.speed < before.speed;
             slow && system.slides_on(k)
         })
@@ -257,16 +258,16 @@ where
         (from, to): (Y::Scalar, Y::Scalar),
     ) -> Option<Found<Y::Scalar>> {
         let zero = Y::Scalar::zero();
-        let (a, b) = (self.left.as_ref()[k], self.right.as_ref()[k]);
+        let (a, b) = (*self.left.as_ref().get(k)?, *self.right.as_ref().get(k)?);
         let (at_a, at_b) = (a.value(which)?, b.value(which)?);
-        let mode = system.modes()[k];
+        let mode = system.mode(k);
         if mode == Mode::Open && self.is_far(k) {
             return None;
         }
         if system.redundant && !system.shares() && mode != Mode::Open && !(mode == Mode::Slide && which == 1) {
             return None;
         }
-        let cause = causes(mode)[which];
+        let cause = *causes(mode).get(which)?;
         let value = move |w: &Watched<Y::Scalar>| w.value(which).unwrap_or(zero);
         let mut end = (to, at_b);
         if !(at_b <= zero) {
@@ -325,7 +326,8 @@ where
         value: impl Fn(&Watched<Y::Scalar>) -> Y::Scalar,
     ) -> Option<(Y::Scalar, Y::Scalar)> {
         let mut width = to - from;
-        for _ in 0..HALVINGS[usize::from(system.modes()[k] != Mode::Open)] {
+        let [of_gap, of_other] = HALVINGS;
+        for _ in 0..if system.mode(k) == Mode::Open { of_gap } else { of_other } {
             width = Y::Scalar::constant(0.5) * width;
             let x = from + width;
             let found = self.value_at(system, k, x, &value);
@@ -363,15 +365,15 @@ impl<Y: Touching> WithContacts<Y> {
     pub(super) fn watched(&self, k: usize) -> Watched<Y::Scalar> {
         let zero = Y::Scalar::zero();
         let c = self.contact(k);
-        let [normal, x, y] = self.at.forces.as_ref()[k];
+        let [normal, x, y] = self.force(k);
         let held = usize::from(!self.is_open());
         let none = Watched { turning: self.turning(k), ..Watched::zero() };
-        match self.modes()[k] {
+        match self.mode(k) {
             Mode::Open => {
                 Watched { first: self.gap(k) + Y::Scalar::constant(OVERLAP[held]), rate: self.gap_rate(k), ..none }
             }
             Mode::Slide => {
-                let ([vx, vy], [a, b]) = (self.tangential(k), self.slip.as_ref()[k]);
+                let ([vx, vy], [a, b]) = (self.tangential(k), self.slip_of(k));
                 let rubs = c.tangents && c.friction > zero;
                 Watched { first: normal, speed: self.speed(k), second: rubs.then_some(vx * a + vy * b), ..none }
             }

@@ -1,7 +1,7 @@
 //! The residual of the laws of contact.
 
 use super::{Problem, Terms, Touch};
-use crate::contact::lists::get;
+use crate::lists::get;
 use crate::system::Real;
 
 /// Length of a vector; at the origin, where it has no derivative, that of numbers with derivatives is zero.

@@ -1,7 +1,7 @@
 //! One contact by itself, exactly.
 
 use super::{cone, Terms, Touch};
-use crate::contact::lists::get;
+use crate::lists::get;
 use crate::system::Real;
 
 /// Points of the circle of directions between which roots are bracketed.

@@ -17,8 +17,8 @@ mod routh;
 #[cfg(test)]
 mod tests;
 
-use super::lists::{copy, get, part, set, split};
 use super::Contact;
+use crate::lists::{copy, get, part, set, split};
 use crate::system::Real;
 
 pub(super) use newton::eliminate;
@@ -190,6 +190,7 @@ pub(super) fn solve_near<S: Real>(
     impulses: &mut [S],
     work: &mut [S],
 ) -> Result<Certificate<S>, ContactError> {
+    fits(problem, impulses, work)?;
     if let Effort::ToTolerance { tolerance, .. } = effort {
         let (least, rest) = split(work, problem.b.len());
         least.fill(S::zero());

@@ -1,6 +1,7 @@
 //! A step of Newton's method on the projection equations of Alart and Curnier (1991), for all contacts at once.
 
 use super::{cone, Terms, Touch};
+use crate::lists::{copy, first_mut, get, part, part_mut, set, split, swap};
 use crate::system::Real;
 
 /// Added to the diagonal of equations for velocities: where contacts are redundant their matrix is singular, and any of
@@ -13,9 +14,9 @@ const HALVINGS: u32 = 5;
 /// room for a square matrix and three lists.
 pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], residual: S, work: &mut [S]) -> bool {
     let n = impulses.len();
-    let (matrix, rest) = work.split_at_mut(n * n);
-    let (step, rest) = rest.split_at_mut(n);
-    let start = &mut rest[..n];
+    let (matrix, rest) = split(work, n * n);
+    let (step, rest) = split(rest, n);
+    let start = first_mut(rest, n);
     matrix.fill(S::zero());
     for touch in terms.problem.touches {
         equations(terms, touch, impulses, matrix, step);
@@ -23,7 +24,7 @@ pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], residual: S, w
     if !eliminate(matrix, step) {
         return false;
     }
-    start.copy_from_slice(impulses);
+    copy(start, impulses);
     let mut part = S::one();
     for _ in 0..HALVINGS {
         for ((p, start), step) in impulses.iter_mut().zip(start.iter()).zip(step.iter()) {
@@ -35,7 +36,7 @@ pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], residual: S, w
         }
         part = S::constant(0.5) * part;
     }
-    impulses.copy_from_slice(start);
+    copy(impulses, start);
     false
 }
 
@@ -43,8 +44,8 @@ pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], residual: S, w
 /// to the diagonal leaves. `false` where the equations are singular.
 pub(super) fn differentiate<S: Real>(terms: &Terms<S>, impulses: &mut [S], work: &mut [S]) -> bool {
     let n = impulses.len();
-    let (matrix, rest) = work.split_at_mut(n * n);
-    let step = &mut rest[..n];
+    let (matrix, rest) = split(work, n * n);
+    let step = first_mut(rest, n);
     (0..2).all(|_| {
         matrix.fill(S::zero());
         for touch in terms.problem.touches {
@@ -64,28 +65,32 @@ fn equations<S: Real>(terms: &Terms<S>, touch: &Touch<S>, impulses: &[S], matrix
     let problem = terms.problem;
     let (n, c) = (problem.b.len(), touch.contact);
     let (row, mass, more) = (c.row, cone::mass(problem, touch), terms.proximal(touch));
-    let (least, friction) = (terms.least[row], c.friction);
-    let a = |i: usize, j: usize| mass * if i == j { problem.a[i * n + j] + more } else { problem.a[i * n + j] };
-    let (p, v) = (impulses[row], terms.velocity(touch, row, impulses));
+    let (least, friction) = (get(terms.least, row), c.friction);
+    let a = |i: usize, j: usize| {
+        let own = get(problem.a, i * n + j);
+        mass * if i == j { own + more } else { own }
+    };
+    let (p, v) = (get(impulses, row), terms.velocity(touch, row, impulses));
     let normal = p - mass * v;
     let pressed = normal > least;
-    for j in 0..n {
-        matrix[row * n + j] = if pressed { a(row, j) } else { zero };
-    }
     let prox = S::constant(PROXIMAL);
-    let own = row * n + row;
-    matrix[own] = if pressed { matrix[own] + prox } else { one };
-    step[row] = if pressed { mass * v } else { p - least };
+    let line = part_mut(matrix, row * n, n);
+    for (j, entry) in line.iter_mut().enumerate() {
+        *entry = if pressed { a(row, j) } else { zero };
+    }
+    let own = if pressed { get(line, row) + prox } else { one };
+    set(line, row, own);
+    set(step, row, if pressed { mass * v } else { p - least });
     if !c.tangents {
         return;
     }
-    let x: [S; 2] = core::array::from_fn(|i| impulses[row + 1 + i]);
+    let x: [S; 2] = core::array::from_fn(|i| get(impulses, row + 1 + i));
     let u: [S; 2] = core::array::from_fn(|i| terms.velocity(touch, row + 1 + i, impulses));
     if let Some(slip) = touch.slip {
         for i in 0..2 {
-            step[row + 1 + i] = x[i] + friction * p * slip[i];
-            matrix[(row + 1 + i) * n + row + 1 + i] = one;
-            matrix[(row + 1 + i) * n + row] = friction * slip[i];
+            set(step, row + 1 + i, x[i] + friction * p * slip[i]);
+            set(matrix, (row + 1 + i) * n + row + 1 + i, one);
+            set(matrix, (row + 1 + i) * n + row, friction * slip[i]);
         }
         return;
     }
@@ -94,17 +99,17 @@ fn equations<S: Real>(terms: &Terms<S>, touch: &Touch<S>, impulses: &[S], matrix
     let z: [S; 2] = core::array::from_fn(|i| x[i] - mass * u[i]);
     let size = cone::length(z);
     for i in 0..2 {
-        let at = (row + 1 + i) * n;
         let sticks = size <= radius;
-        step[row + 1 + i] = if sticks { mass * u[i] } else { x[i] - radius / size * z[i] };
-        for j in 0..n {
+        set(step, row + 1 + i, if sticks { mass * u[i] } else { x[i] - radius / size * z[i] });
+        let line = part_mut(matrix, (row + 1 + i) * n, n);
+        for (j, entry) in line.iter_mut().enumerate() {
             // Derivative of z and of the radius with respect to impulse j.
             let dz: [S; 2] = core::array::from_fn(|k| {
                 let unit = if j == row + 1 + k { one } else { zero };
                 unit - a(row + 1 + k, j)
             });
             let dr = if pressed { friction * ((if j == row { one } else { zero }) - a(row, j)) } else { zero };
-            matrix[at + j] = if sticks {
+            *entry = if sticks {
                 a(row + 1 + i, j)
             } else {
                 let along = (z[0] * dz[0] + z[1] * dz[1]) / (size * size);
@@ -112,7 +117,8 @@ fn equations<S: Real>(terms: &Terms<S>, touch: &Touch<S>, impulses: &[S], matrix
                 (if j == row + 1 + i { one } else { zero }) - turned - dr * (z[i] / size)
             };
         }
-        matrix[at + row + 1 + i] = matrix[at + row + 1 + i] + if sticks { prox } else { zero };
+        let own = get(line, row + 1 + i) + if sticks { prox } else { zero };
+        set(line, row + 1 + i, own);
     }
 }
 
@@ -120,7 +126,7 @@ fn equations<S: Real>(terms: &Terms<S>, touch: &Touch<S>, impulses: &[S], matrix
 pub(in crate::contact) fn eliminate<S: Real>(matrix: &mut [S], rhs: &mut [S]) -> bool {
     let n = rhs.len();
     for k in 0..n {
-        let size = |i: usize| matrix[i * n + k].abs();
+        let size = |i: usize| get(matrix, i * n + k).abs();
         let mut best = k;
         for i in k + 1..n {
             if size(i) > size(best) {
@@ -131,25 +137,27 @@ pub(in crate::contact) fn eliminate<S: Real>(matrix: &mut [S], rhs: &mut [S]) ->
             return false;
         }
         if best != k {
-            for j in 0..n {
-                matrix.swap(k * n + j, best * n + j);
-            }
-            rhs.swap(k, best);
+            let (above, below) = split(matrix, best * n);
+            swap(part_mut(above, k * n, n), first_mut(below, n));
+            let (above, below) = split(rhs, best);
+            swap(part_mut(above, k, 1), first_mut(below, 1));
         }
-        for i in k + 1..n {
-            let factor = matrix[i * n + k] / matrix[k * n + k];
-            for j in k + 1..n {
-                matrix[i * n + j] = matrix[i * n + j] - factor * matrix[k * n + j];
+        let (above, below) = split(matrix, (k + 1) * n);
+        let line = part(above, k * n, n);
+        let (pivot, own) = (get(line, k), get(rhs, k));
+        for (other, rhs) in below.chunks_exact_mut(n).zip(rhs.iter_mut().skip(k + 1)) {
+            let factor = get(other, k) / pivot;
+            for (x, by) in other.iter_mut().zip(line).skip(k + 1) {
+                *x = *x - factor * *by;
             }
-            rhs[i] = rhs[i] - factor * rhs[k];
+            *rhs = *rhs - factor * own;
         }
     }
     for k in (0..n).rev() {
-        let mut sum = rhs[k];
-        for j in k + 1..n {
-            sum = sum - matrix[k * n + j] * rhs[j];
-        }
-        rhs[k] = sum / matrix[k * n + k];
+        let line = part(matrix, k * n, n);
+        let known = line.iter().zip(rhs.iter()).skip(k + 1);
+        let sum = known.fold(get(rhs, k), |sum, (a, x)| sum - *a * *x);
+        set(rhs, k, sum / get(line, k));
     }
     rhs.iter().all(|x| x.is_finite())
 }
