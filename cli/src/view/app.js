@@ -261,19 +261,23 @@ function ended(text) {
   trouble("The motion cannot go on", `${text}\nRestart it, change its start, or take shorter steps.`);
 }
 
-/** Draws coarser while a motion is shown by fewer than forty pictures a second, first without smooth edges, and sharp again when it stands still. */
+/** Draws coarser while a motion is shown by fewer than forty pictures a second, or two thirds of what the screen has, first without smooth
+ *  edges; sharp again when it stands still. */
 function pace(passed) {
+  page.period = Math.max(1 / 60, Math.min(page.period, passed || 1));
   if (!page.playing) {
     if (!canvas.smooth) page.changed = true;
     [canvas.smooth, canvas.fineness, page.pace] = [true, 1, 0];
     return;
   }
   page.pace += 0.1 * (passed - page.pace);
-  if (page.pace < 1 / 40 || canvas.fineness <= 0.4) return;
+  if (page.pace < 1.5 * page.period || canvas.fineness <= 0.4) return;
   if (!canvas.smooth) canvas.fineness = Math.max(0.4, 0.75 * canvas.fineness);
   [canvas.smooth, page.pace] = [false, 0];
 }
 page.pace = 0;
+/** Least time between two pictures, s: that of the screen, or of sixty a second. */
+page.period = 1;
 
 /** A frame of the page. */
 function tick(now) {
