@@ -256,9 +256,10 @@ struct Departure<S> {
 /// within a step too, which its rate tells. While all contacts are open, gaps are not looked at before the joints have
 /// moved so far that one of them may have closed ([`Touching::reaches`]).
 ///
-/// While contacts are closed, momenta collect their multipliers, and a contact that opens would make velocities of them. So
-/// the method has to free them of these at the ends of steps: [`WithPostStep`](crate::constrained::WithPostStep) with a
-/// [`Projection`](crate::constrained::Projection).
+/// While contacts are closed, momenta collect their multipliers. Events free them of these, so that a contact that opens does not
+/// make velocities of them; between events, a state's momenta and energy contain them unless the method projects
+/// momenta at the ends of steps: [`WithPostStep`](crate::constrained::WithPostStep) with a
+/// [`Projection`](crate::constrained::Projection), which also keeps closed contacts from drifting.
 #[derive(Clone, Debug)]
 pub struct Hybrid<Y: Touching, M> {
     solver: Solver<WithContacts<Y>, M>,

@@ -15,6 +15,9 @@ const SLOW: f64 = 1e-9;
 /// First step, s, above which the one that the method chooses is taken.
 const LONGEST: f64 = 1e-4;
 
+/// Part of the momenta above which what they are off is taken for multipliers, not for rounding.
+const COLLECTED: f64 = 1e-6;
+
 /// Speed of approach, m/s (rad/s), below which there is no impact.
 pub(super) const APPROACH: f64 = 1e-10;
 
@@ -43,6 +46,7 @@ where
             rest: None,
         };
         system.look(t, &self.q, &self.p);
+        self.free_momenta(system);
         if found.cause == Cause::Slipped {
             system.loads(t, &self.q, true);
         }
@@ -56,6 +60,20 @@ where
         self.statistics.events += u64::from(happened);
         self.unchanged = !happened;
         Ok(happened.then_some(event))
+    }
+
+    /// Frees momenta of the multipliers that they have collected under a method that does not project them: a contact that
+    /// opens would make velocities of these. What is projected differs by rounding, and is left as it is.
+    fn free_momenta(&mut self, system: &WithContacts<Y>) {
+        let zero = Y::Scalar::zero();
+        let largest = |most: Y::Scalar, x: Y::Scalar| if x.abs() > most { x.abs() } else { most };
+        let free = system.p.as_ref();
+        // Where everything stops, momenta are rounding: the step began with those that count.
+        let most = free.iter().chain(self.start.2.as_ref()).fold(zero, |most, p| largest(most, *p));
+        let off = self.p.as_ref().iter().zip(free).fold(zero, |most, (p, free)| largest(most, *p - *free));
+        if off.to_f64() > COLLECTED * most.to_f64() {
+            copy(self.p.as_mut(), free);
+        }
     }
 
     /// Counts the events at one instant.
