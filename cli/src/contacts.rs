@@ -225,7 +225,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
 
 /// What computed the steps.
 pub fn ways(touched: &Touched, choice: RegimeChoice) -> String {
-    let [_, _, compiled, interpreted] = touched.contacts.steps;
+    let [_, _, compiled, interpreted, _] = touched.contacts.steps;
     let (sets, steps) = (touched.visits.len(), touched.stepping.steps);
     let events = format!("{compiled} steps by machine code, {interpreted} by the interpreter, {sets} sets of modes");
     match choice {

@@ -14,11 +14,12 @@ use super::args::ModesArgs;
 use super::output::{writable, write_files};
 use super::{contacts, generate, simulate, source, verdict, Failure, Outcome};
 
-/// The modes for which code is made: `masked`, `all`, or a file, relative to `folder`, that lists them.
+/// The modes for which code is made: `masked`, `all`, `factored`, or a file, relative to `folder`, that lists them.
 pub fn choice(argument: &str, folder: &Path, model: &Model) -> Outcome<ModeChoice> {
     match argument {
         "masked" => Ok(ModeChoice::Masked),
         "all" => Ok(ModeChoice::All),
+        "factored" => Ok(ModeChoice::Factored),
         path => {
             let text = source::read(&folder.join(path))?;
             modes::parse(&text, model).map(ModeChoice::Listed).map_err(|errors| {
@@ -93,6 +94,13 @@ pub fn count(plan: &Plan, options: &Options, out: &mut dyn Write) -> Outcome {
     for (output, counts) in &generated.counts {
         let whole = if *output == Output::Gaps { full.clone() } else { full.masked() };
         line("all, by numbers", &whole, *output, counts.total())?;
+    }
+    for pieces in &generated.pieces {
+        let mut line =
+            |what: &str, operations: usize| writeln!(out, "{what:<40}{:<24}{operations:>12}", pieces.output.name());
+        line(&format!("all, in {} pieces", pieces.count), pieces.operations)?;
+        line("  executed where nothing touches", pieces.flight)?;
+        line("  executed where everything sticks", pieces.stick)?;
     }
     Ok(())
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use mbd_runtime::contact::{rows_that_act, Mode};
 
 use crate::error::GenerateError;
+use crate::factored::{factored, FactoredProgram};
 use crate::modes::{ModeChoice, OF_EACH_SET};
 use crate::options::{Arithmetic, Options, Precision};
 use crate::output::{Output, OutputProgram, Sizes};
@@ -77,6 +78,8 @@ pub struct Programs {
     pub together: Vec<(&'static str, RolledProgram, Vectors)>,
     /// Programs of the outputs in [`OF_EACH_SET`] for sets of modes of contacts.
     pub sets: Vec<SetPrograms>,
+    /// Programs of these outputs put together from pieces for the modes of contacts.
+    pub factored: Vec<OutputProgram<FactoredProgram>>,
 }
 
 /// The programs for one set of modes of the contacts.
@@ -107,6 +110,7 @@ impl Programs {
             frames,
             together: Vec::new(),
             sets: Vec::new(),
+            factored: Vec::new(),
         })
     }
 
@@ -118,11 +122,20 @@ impl Programs {
     pub fn of_modes(full: &Plan, choice: &ModeChoice, options: &Options) -> Result<Programs, GenerateError> {
         let sets = choice.sets(&full.model)?;
         let gaps = |output: &Output| *output == Output::Gaps;
-        let others =
-            Options { outputs: options.outputs.iter().copied().filter(|o| !gaps(o)).collect(), ..options.clone() };
+        let in_pieces = |output: &Output| *choice == ModeChoice::Factored && OF_EACH_SET.contains(output);
+        let others = options.outputs.iter().copied().filter(|o| !gaps(o) && !in_pieces(o)).collect();
+        let others = Options { outputs: others, ..options.clone() };
         let mut programs = Programs::new(&full.masked(), &others)?;
         for output in options.outputs.iter().filter(|o| gaps(o)) {
             programs.outputs.push(compile(full, *output, options)?);
+        }
+        for output in options.outputs.iter().filter(|o| in_pieces(o)) {
+            let program = factored(full, *output, options);
+            let program = program.ok_or_else(|| GenerateError::ModesNotFactored { model: full.model.name.clone() })?;
+            for piece in program.program.pieces() {
+                finite(full, *output, &Code::Straight(piece.program.clone()), options.precision)?;
+            }
+            programs.factored.push(program);
         }
         let (contacts, rows) = (full.contacts::<f64>(), full.dims.rows);
         for modes in sets {

@@ -58,6 +58,11 @@ pub enum GenerateError {
         /// Largest number.
         most: usize,
     },
+    /// Modes of contacts are to be factored, and they cannot be.
+    ModesNotFactored {
+        /// Name of the model.
+        model: String,
+    },
     /// Code for modes of contacts is Rust only.
     ModesNeedRust,
     /// A number in the code is infinite: a freedom has no inertia, which the checks of the model cannot see where
@@ -107,6 +112,9 @@ impl fmt::Display for GenerateError {
             }
             GenerateError::TooManyModes { sets, most } => {
                 write!(f, "there are {sets} sets of modes, and at most {most} get code of their own: list those that a motion visits (`mbd modes --record`)")
+            }
+            GenerateError::ModesNotFactored { model } => {
+                write!(f, "the contacts of `{model}` have too many modes for pieces, which serve limbs that have a few contacts each: list those that a motion visits (`mbd modes --record`)")
             }
             GenerateError::ModesNeedRust => {
                 write!(f, "code for modes of contacts exists in Rust only")

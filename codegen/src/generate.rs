@@ -7,6 +7,7 @@ use crate::emit;
 #[doc(hidden)]
 pub use crate::emit::quantity;
 pub use crate::error::GenerateError;
+use crate::factored::Group;
 use crate::model::Model;
 use crate::modes::OF_EACH_SET;
 pub use crate::options::{Arithmetic, LikeBranches, Options, Precision, RolledCode};
@@ -28,8 +29,25 @@ pub struct Generated {
     pub counts: Vec<(Output, Counts)>,
     /// Sets of modes of contacts that have functions of their own, with operations of each of these.
     pub sets: Vec<CountsOfModes>,
+    /// Operations of the outputs that are put together from pieces.
+    pub pieces: Vec<CountsOfPieces>,
     /// Notices about changes, such as angles that became right angles.
     pub notices: Vec<String>,
+}
+
+/// The operations of an output that is put together from pieces.
+#[derive(Clone, Copy, Debug)]
+pub struct CountsOfPieces {
+    /// Which output.
+    pub output: Output,
+    /// Number of pieces.
+    pub count: usize,
+    /// Operations of all pieces.
+    pub operations: usize,
+    /// Operations that are executed where all contacts are open.
+    pub flight: usize,
+    /// The same where every contact sticks, or is closed if it has no friction.
+    pub stick: usize,
 }
 
 /// Modes of the contacts, and the operations of the functions that were generated for them.
@@ -62,7 +80,22 @@ pub fn generate_from(plan: &Plan, options: &Options) -> Result<Generated, Genera
         let outputs = OF_EACH_SET.into_iter().filter(|output| options.outputs.contains(output));
         (set.modes.clone(), outputs.zip(set.outputs.iter().map(|p| p.program.counts())).collect())
     });
-    Ok(Generated { source, counts: programs.counts(options), sets: sets.collect(), notices: plan.notices.clone() })
+    let pieces = options.outputs.iter().filter_map(|output| {
+        let program = &programs.factored.iter().find(|program| program.spec.name == output.name())?.program;
+        let of = |number: fn(&Group) -> usize| {
+            let limbs: Vec<usize> = program.groups.iter().map(number).collect();
+            program.counts_of(&program.choice(limbs)).total()
+        };
+        Some(CountsOfPieces {
+            output: *output,
+            count: program.pieces().filter(|piece| !piece.is_empty()).count(),
+            operations: program.counts().total(),
+            flight: of(|_| 0),
+            stick: of(|group| group.modes.len() - 1),
+        })
+    });
+    let (pieces, notices) = (pieces.collect(), plan.notices.clone());
+    Ok(Generated { source, counts: programs.counts(options), sets: sets.collect(), pieces, notices })
 }
 
 /// Rust that carries states over from one generated type to another: the implementation of the runtime's `TransferFrom`

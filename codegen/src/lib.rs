@@ -8,6 +8,7 @@ mod contacts;
 pub mod diag;
 mod emit;
 mod error;
+pub mod factored;
 pub mod generate;
 pub mod identifiable;
 mod import;
@@ -38,7 +39,7 @@ pub mod wasm;
 pub use import::words;
 
 pub use generate::{
-    generate, transfer_code, Arithmetic, CountsOfModes, GenerateError, Generated, LikeBranches, Options, Output,
-    Precision, RolledCode,
+    generate, transfer_code, Arithmetic, CountsOfModes, CountsOfPieces, GenerateError, Generated, LikeBranches,
+    Options, Output, Precision, RolledCode,
 };
 pub use names::camel_case;

@@ -18,6 +18,9 @@ pub const OF_EACH_SET: [Output; 3] = [Output::Rates, Output::ProjectMomenta, Out
 pub enum ModeChoice {
     /// One function for all modes: every row is computed, and numbers say which act.
     Masked,
+    /// Functions that are put together from pieces, of limbs in their modes and of the trunk for each sequence of limbs
+    /// that touch.
+    Factored,
     /// Beside it, functions for some sets of modes, each of which has one mode for each contact of the model.
     Listed(Vec<Vec<Mode>>),
     /// Beside it, functions for all sets of modes, of which there are at most [`MOST_SETS`].
@@ -34,7 +37,7 @@ impl ModeChoice {
             return Err(GenerateError::ModesNeedContacts { model: model.name.clone() });
         }
         match self {
-            ModeChoice::Masked => Ok(Vec::new()),
+            ModeChoice::Masked | ModeChoice::Factored => Ok(Vec::new()),
             ModeChoice::Listed(sets) => {
                 let mut distinct: Vec<Vec<Mode>> = Vec::new();
                 for set in sets {
@@ -54,7 +57,7 @@ impl ModeChoice {
 }
 
 /// The modes that a contact can have.
-fn modes_of(kind: &ConstraintKind, friction: f64) -> &'static [Mode] {
+pub(crate) fn modes_of(kind: &ConstraintKind, friction: f64) -> &'static [Mode] {
     match kind {
         ConstraintKind::Loop { .. } if friction > 0.0 => &[Mode::Open, Mode::Slide, Mode::Stick],
         _ => &[Mode::Open, Mode::Slide],

@@ -76,6 +76,8 @@ pub enum Modes {
     Masked,
     /// All sets of modes.
     All,
+    /// In pieces that serve all sets of modes.
+    Factored,
     /// Sets of modes in a file.
     Recorded(String),
     /// Sets of modes as text: one on each line.
@@ -378,15 +380,16 @@ fn frames(value: &[TokenTree]) -> Result<Vec<(String, Place)>, Message> {
     Ok(chosen)
 }
 
-/// `masked`, `all`, `recorded("file")` or `["open", "stick"]`.
+/// `masked`, `all`, `factored`, `recorded("file")` or `["open", "stick"]`.
 fn modes(value: &[TokenTree]) -> Result<Modes, Message> {
     let help =
-        "write `modes = masked`, `modes = all`, `modes = recorded(\"robot.modes\")` with a file that `mbd simulate \
+        "write `modes = masked`, `modes = all`, `modes = factored`, `modes = recorded(\"robot.modes\")` with a file that `mbd simulate \
                 --record-modes` writes, or `modes = [\"open open\", \"stick open\"]` with a word for each contact";
     let wrong = || Message::new(place(value), "`modes` cannot be read", help);
     match value {
         [TokenTree::Ident(word)] if *word == "masked" => Ok(Modes::Masked),
         [TokenTree::Ident(word)] if *word == "all" => Ok(Modes::All),
+        [TokenTree::Ident(word)] if *word == "factored" => Ok(Modes::Factored),
         [TokenTree::Ident(word), TokenTree::Group(g)] if *word == "recorded" => {
             let tokens = visible(g.stream());
             let path = match tokens.as_slice() {

@@ -230,6 +230,7 @@ fn modes_of(
     let (text, name, file) = match modes {
         Modes::Masked => return (Some(ModeChoice::Masked), None),
         Modes::All => return (Some(ModeChoice::All), None),
+        Modes::Factored => return (Some(ModeChoice::Factored), None),
         Modes::Listed(text) => (text.clone(), "set", None),
         Modes::Recorded(path) => {
             let file = std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from).unwrap_or_default().join(path);

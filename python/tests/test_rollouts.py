@@ -242,7 +242,10 @@ def test_other_threads_of_python_run_meanwhile(arm):
 
 @pytest.mark.skipif(os.name != "posix", reason="sends itself a signal")
 @pytest.mark.parametrize("threads, rows", [(1, 1), (2, 2)])
-def test_an_interrupt_is_answered_within_a_second(arm, threads, rows):
+def test_an_interrupt_is_answered_within_a_second(arm, threads, rows, request):
+    # A process that was begun in the background may ignore interrupts.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     sent = [0.0]
 
     def interrupt():

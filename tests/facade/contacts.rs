@@ -17,6 +17,12 @@ mod made {
         path = "models/contacts/simplest_walker.toml", name = Walker, modes = masked, arithmetic = exact
     }
     multibody::mbd_model! {
+        path = "models/contacts/simplest_walker.toml", name = Limbs, modes = factored, arithmetic = exact
+    }
+    multibody::mbd_model! {
+        path = "models/contacts/hopper.toml", name = Pieces, modes = factored
+    }
+    multibody::mbd_model! {
         path = "models/contacts/bouncing_ball.toml", name = Ball, modes = ["open"], arithmetic = exact
     }
     multibody::mbd_model! {
@@ -41,7 +47,7 @@ struct Motion {
     events: Vec<ContactEvent<f64>>,
     end: [Vec<f64>; 2],
     energy: f64,
-    steps: [u64; 4],
+    steps: [u64; 5],
 }
 
 fn follow<Y>(mut mechanism: Y, q: &[f64], v: &[f64], time: f64) -> Motion
@@ -103,6 +109,21 @@ fn one_function_for_all_modes() {
     // Both feet touch the slope; one of them lifts off.
     let walker = compared(made::Walker::new(), "simplest_walker.toml", None, &[0.0, 0.0, -0.3, 0.2], 1.0);
     assert_eq!(ways(&walker), [false, true], "{:?}", walker.steps);
+}
+
+#[test]
+fn pieces_for_all_modes() {
+    let walker = compared(made::Limbs::new(), "simplest_walker.toml", None, &[0.0, 0.0, -0.3, 0.2], 1.0);
+    assert_eq!(walker.steps[Way::Factored as usize], walker.steps.iter().sum::<u64>(), "{:?}", walker.steps);
+    // In fast arithmetic, other roundings.
+    let [pieces, whole] = [
+        follow(made::Pieces::new(), &made::Pieces::START, &[0.0; made::Pieces::NV], 1.0),
+        follow(made::Hopper::new(), &made::Hopper::START, &[0.0; made::Hopper::NV], 1.0),
+    ];
+    assert_eq!(pieces.events.len(), whole.events.len());
+    for (a, b) in pieces.end.iter().flatten().zip(whole.end.iter().flatten()) {
+        assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
 }
 
 #[test]

@@ -131,9 +131,9 @@ pub struct GenerateArgs {
     #[command(flatten)]
     pub code: CodeArgs,
     /// Make code for the modes of the contacts: `masked` for functions in which numbers say which contacts act, `all` for
-    /// functions for every set of modes beside these, or a FILE with the sets to take, as `mbd simulate --record-modes`
-    /// writes it. Without it, contacts are no part of the code
-    #[arg(long, value_name = "masked|all|FILE")]
+    /// functions for every set of modes beside these, `factored` for pieces that serve every set, or a FILE with the sets
+    /// to take, as `mbd simulate --record-modes` writes it. Without it, contacts are no part of the code
+    #[arg(long, value_name = "masked|all|factored|FILE")]
     pub modes: Option<String>,
     /// Language of the code
     #[arg(long, value_enum, default_value_t = Language::Rust)]

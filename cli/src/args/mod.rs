@@ -228,8 +228,8 @@ pub struct CountArgs {
     /// Show every elimination that was tried, not only the best of each branch
     #[arg(long)]
     pub candidates: bool,
-    /// Count the code for modes of contacts: `masked`, `all`, or a FILE with sets of modes
-    #[arg(long, value_name = "masked|all|FILE", conflicts_with_all = ["candidates", "json"])]
+    /// Count the code for modes of contacts: `masked`, `all`, `factored`, or a FILE with sets of modes
+    #[arg(long, value_name = "masked|all|factored|FILE", conflicts_with_all = ["candidates", "json"])]
     pub modes: Option<String>,
     /// Print JSON
     #[arg(long)]

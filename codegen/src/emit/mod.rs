@@ -1,6 +1,7 @@
 //! Programs as Rust source. Only this module knows Rust syntax.
 
 pub(crate) mod constants;
+mod factored;
 pub(crate) mod fields;
 pub(crate) mod head;
 pub(crate) mod header;
@@ -15,11 +16,13 @@ mod together;
 mod traits;
 pub(crate) mod transfer;
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use crate::code::{Code, Programs};
+use crate::factored::FactoredProgram;
 use crate::options::Options;
-use crate::output::{Output, OutputProgram, Sizes};
+use crate::output::{InputArray, Output, OutputProgram, Sizes};
 use crate::plan::Plan;
 use crate::rolled::{RolledProgram, Vectors};
 use head::Head;
@@ -51,7 +54,8 @@ pub fn source(input: &Input) -> String {
         let _ = writeln!(out, "{}", format!("// {line}").trim_end());
     }
     out.push('\n');
-    let outputs: Vec<&str> = programs.outputs.iter().map(|p| p.spec.name).collect();
+    let outputs = programs.outputs.iter().map(|p| p.spec.name).chain(programs.factored.iter().map(|p| p.spec.name));
+    let outputs: Vec<&str> = outputs.collect();
     let _ = writeln!(
         out,
         "/// Dynamics of `{}` in canonical form: {}. Set the fields between calls.",
@@ -72,21 +76,31 @@ pub fn source(input: &Input) -> String {
     let functions = functions(input, contacts.as_ref());
     let signatures: Vec<Signature> = functions.iter().map(|f| f.signature(&programs.sizes)).collect();
     let kernels = functions.iter().zip(&signatures).enumerate().map(|(id, (function, signature))| {
-        let program = function.program;
-        let ports = signature.ports(&program.inputs, &program.program.used_inputs());
+        let ports = signature.ports(function.inputs(), &function.used_inputs());
         lanes::Kernel { id, signature, ports }
     });
     let kernels: Vec<lanes::Kernel> = kernels.collect();
     for (function, kernel) in functions.iter().zip(&kernels) {
+        let program = match &function.program {
+            Kind::Whole(program) => *program,
+            Kind::Factored(program) => {
+                let lanes::Kernel { id, signature, ports } = kernel;
+                let _ = write!(out, "\n{}", signature.documentation());
+                let _ = writeln!(out, "    /// Put together from pieces for the modes of the contacts.");
+                let head = Head { options, id: *id, signature, ports, inputs: &program.inputs };
+                factored::FactoredWriter::new(function.plan, &program.program, head).write(&mut out);
+                continue;
+            }
+        };
         if let (Some(contacts), true) = (&contacts, function.first) {
-            contacts.dispatch(&mut out, &Signature::new(function.program.spec, &programs.sizes));
+            contacts.dispatch(&mut out, &Signature::new(program.spec, &programs.sizes));
         }
         let together = programs.together.iter().find(|(name, ..)| *name == kernel.signature.name);
         write_function(
             &mut out,
             function.plan,
             options,
-            function.program,
+            program,
             together.map(|(_, program, vectors)| (program, *vectors)),
             kernel,
         );
@@ -115,9 +129,17 @@ pub fn source(input: &Input) -> String {
     out
 }
 
+/// What a function computes.
+enum Kind<'a> {
+    /// One program.
+    Whole(&'a OutputProgram<Code>),
+    /// Pieces for the modes of contacts.
+    Factored(&'a OutputProgram<FactoredProgram>),
+}
+
 /// A function of the type.
 struct Function<'a> {
-    program: &'a OutputProgram<Code>,
+    program: Kind<'a>,
     plan: &'a Plan,
     /// Its name, where it is the part of an output.
     part: Option<String>,
@@ -127,10 +149,28 @@ struct Function<'a> {
 
 impl Function<'_> {
     fn signature(&self, sizes: &Sizes) -> Signature {
-        let whole = Signature::new(self.program.spec, sizes);
+        let spec = match &self.program {
+            Kind::Whole(program) => program.spec,
+            Kind::Factored(program) => program.spec,
+        };
+        let whole = Signature::new(spec, sizes);
         match &self.part {
             None => whole,
             Some(name) => whole.part(name.clone()),
+        }
+    }
+
+    fn inputs(&self) -> &[InputArray] {
+        match &self.program {
+            Kind::Whole(program) => &program.inputs,
+            Kind::Factored(program) => &program.inputs,
+        }
+    }
+
+    fn used_inputs(&self) -> BTreeSet<usize> {
+        match &self.program {
+            Kind::Whole(program) => program.program.used_inputs(),
+            Kind::Factored(program) => program.program.used_inputs(),
         }
     }
 }
@@ -141,12 +181,18 @@ fn functions<'a>(Input { plan, programs, .. }: &Input<'a>, contacts: Option<&Con
     for program in programs.functions() {
         let part = contacts.and_then(|contacts| contacts.for_all_modes(program.spec.name));
         let first = part.is_some();
-        functions.push(Function { program, plan, part, first });
+        functions.push(Function { program: Kind::Whole(program), plan, part, first });
     }
+    functions.extend(programs.factored.iter().map(|program| Function {
+        program: Kind::Factored(program),
+        plan,
+        part: None,
+        first: false,
+    }));
     for (k, set) in programs.sets.iter().enumerate() {
         functions.extend(set.outputs.iter().map(|program| {
             let part = Some(Contacts::for_set(program.spec.name, k));
-            Function { program, plan: &set.plan, part, first: false }
+            Function { program: Kind::Whole(program), plan: &set.plan, part, first: false }
         }));
     }
     functions

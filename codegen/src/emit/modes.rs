@@ -9,8 +9,10 @@ use super::numbers::literal;
 use super::signature::{nested, Signature};
 use super::traits::{alias, method};
 use crate::code::{Programs, SetPrograms};
+use crate::factored::FactoredProgram;
 use crate::modes::{words, OF_EACH_SET};
 use crate::options::Options;
+use crate::output::OutputProgram;
 use crate::plan::Plan;
 
 /// What generated code has to know of contacts.
@@ -21,6 +23,7 @@ pub struct Contacts<'a> {
     names: Vec<&'a str>,
     rows: usize,
     sets: &'a [SetPrograms],
+    factored: &'a [OutputProgram<FactoredProgram>],
 }
 
 impl<'a> Contacts<'a> {
@@ -28,7 +31,14 @@ impl<'a> Contacts<'a> {
     pub fn new(plan: &'a Plan, options: &'a Options, programs: &'a Programs) -> Option<Self> {
         options.modes.as_ref()?;
         let names = plan.model.contacts.iter().map(|c| c.name.as_str()).collect();
-        Some(Contacts { options, contacts: plan.contacts(), names, rows: plan.dims.rows, sets: &programs.sets })
+        Some(Contacts {
+            options,
+            contacts: plan.contacts(),
+            names,
+            rows: plan.dims.rows,
+            sets: &programs.sets,
+            factored: &programs.factored,
+        })
     }
 
     /// Name of the function of an output for all modes, where others stand beside it.
@@ -170,10 +180,13 @@ impl<'a> Contacts<'a> {
             method(&format!("reaches(&self) -> &[{rt}::contact::Reach<{t}>]"), "const { &Self::REACHES }"),
             method(
                 &format!("way(&self) -> {rt}::contact::Way"),
-                &format!(
-                    "match self.set < {} {{ true => {rt}::contact::Way::Generated, false => {rt}::contact::Way::Masked }}",
-                    self.sets.len()
-                ),
+                &match self.factored.is_empty() {
+                    true => format!(
+                        "match self.set < {} {{ true => {rt}::contact::Way::Generated, false => {rt}::contact::Way::Masked }}",
+                        self.sets.len()
+                    ),
+                    false => format!("{rt}::contact::Way::Factored"),
+                },
             ),
             method(
                 &format!("act(&mut self, modes: &[{rt}::contact::Mode])"),
@@ -206,6 +219,17 @@ impl<'a> Contacts<'a> {
                 n => format!("{}..{}", contact.row, contact.row + n),
             };
             lines.push(format!("  [{rows}] {name}"));
+        }
+        for program in self.factored {
+            let (name, program) = (program.spec.name, &program.program);
+            let pieces = program.pieces().filter(|piece| !piece.is_empty()).count();
+            let flight = program.counts_of(&program.choice(vec![0; program.groups.len()])).total();
+            let stick = program.groups.iter().map(|group| group.modes.len() - 1).collect();
+            let stick = program.counts_of(&program.choice(stick)).total();
+            lines.push(format!(
+                "{name}: {pieces} pieces of {} operations; {flight} where nothing touches, {stick} where everything sticks",
+                program.counts().total()
+            ));
         }
         if !self.sets.is_empty() {
             lines.extend([String::new(), "Operations in sets of modes, contact by contact:".to_string()]);

@@ -6,6 +6,7 @@ use mbd_runtime::sweep::Quantity;
 
 pub use crate::names::identifier;
 
+use crate::factored::{Piece, Source};
 use crate::output::{locate, InputArray};
 use crate::plan::Plan;
 use crate::rolled::{Block, Place, RolledProgram};
@@ -75,6 +76,18 @@ impl Names {
         let bodies: Vec<String> = plan.nodes.iter().map(|n| identifier(&n.name)).collect();
         let body = |node: Option<usize>| node.map_or("ground", |i| bodies[i].as_str()).to_string();
         self.of(program, body, |k| input(inputs, k))
+    }
+
+    /// Names of a piece of factored code.
+    pub fn piece(self, plan: &Plan, piece: &Piece, inputs: &[InputArray]) -> BTreeMap<u32, String> {
+        let body = |node: Option<usize>| node.map_or("ground".to_string(), |i| identifier(&plan.nodes[i].name));
+        let source = |k: usize| match piece.inputs[k] {
+            Source::Given(k) => input(inputs, k),
+            Source::Kept(k) => format!("kept_{k}"),
+            Source::Own(k) => format!("own_{k}"),
+            Source::Part { place, entry } => format!("part{place}_{entry}"),
+        };
+        self.of(&piece.program, body, source)
     }
 
     /// Names of a block of rolled code; in loops they contain the place of the link in its iteration.

@@ -13,7 +13,7 @@ use super::names::{heading, Names};
 use super::together::TogetherWriter;
 use crate::plan::Plan;
 use crate::rolled::Vectors;
-use crate::symbolic::angles::{nodes, Angles, Pairs};
+use crate::symbolic::angles::{nodes, pairs, Angles, Pairs};
 use crate::symbolic::{Label, Op, Program, ProgramResult};
 
 /// A program with names for its values and places for its results.
@@ -23,6 +23,8 @@ pub struct Straight<'a> {
     program: &'a Program,
     names: BTreeMap<u32, String>,
     angles: Angles,
+    /// How inputs are read, where they are not those of the function.
+    sources: Option<&'a [String]>,
 }
 
 /// A `let`.
@@ -39,7 +41,27 @@ impl<'a> Straight<'a> {
     /// Names every value after its body, quantity and component.
     pub fn new(plan: &'a Plan, program: &'a Program, head: Head<'a>) -> Self {
         let names = Names::default().straight(plan, program, head.inputs);
-        Straight { plan, head, program, names, angles: Angles::new(program) }
+        Straight { plan, head, program, names, angles: Angles::new(program), sources: None }
+    }
+
+    /// Statements of one state whose inputs are read as `sources` say, as the body of a function that has a head of its
+    /// own.
+    pub fn piece(
+        plan: &'a Plan,
+        program: &'a Program,
+        head: Head<'a>,
+        names: BTreeMap<u32, String>,
+        sources: &'a [String],
+    ) -> Self {
+        let angles = Angles { late: pairs(program), ..Angles::default() };
+        Straight { plan, head, program, names, angles, sources: Some(sources) }
+    }
+
+    /// The statements of a piece, and its results as they are written.
+    pub fn write_piece(&self, out: &mut String) -> Vec<String> {
+        let all = self.program.steps.iter().map(|(id, ..)| *id).collect();
+        self.write_steps(out, &all, true);
+        self.program.outputs.iter().map(|result| self.head.value(result, &self.names)).collect()
     }
 
     /// Writes the function and its kernel, which leaves one state to the function for like branches `together`, if there
@@ -91,7 +113,7 @@ impl<'a> Straight<'a> {
     fn write_steps(&self, out: &mut String, set: &BTreeSet<u32>, lanes: bool) {
         let mut late = self.angles.late.clone();
         // Inputs are copied for the loop over lanes only.
-        let given = match lanes {
+        let given = match lanes && self.sources.is_none() {
             true => self.given().enumerate().map(|(k, (id, _))| (id, k)).collect(),
             false => BTreeMap::new(),
         };
@@ -152,7 +174,13 @@ impl<'a> Straight<'a> {
         let (angle, row) = match op {
             Op::Sin(a) => (a, "sines"),
             Op::Cos(a) => (a, "cosines"),
-            Op::Input(k) => return own(format!("let {name} = {};", self.head.input(*k as usize, "", "l")), Vec::new()),
+            Op::Input(k) => {
+                let from = match self.sources {
+                    Some(sources) => sources[*k as usize].clone(),
+                    None => self.head.input(*k as usize, "", "l"),
+                };
+                return own(format!("let {name} = {from};"), Vec::new());
+            }
             op => return own(format!("let {name} = {};", self.head.expression(op, &self.names)), nodes(op).collect()),
         };
         if let Some(k) = self.angles.early.keys().position(|a| a == angle) {

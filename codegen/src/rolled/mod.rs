@@ -29,6 +29,8 @@ use crate::symbolic::{Counts, Label, Program, ProgramResult};
 
 pub use cost::cost;
 pub use mbd_runtime::sweep::pass::SweepDirection;
+pub(crate) use partition::{assemble, nodes, output};
+pub(crate) use pass_state::{read, OutputSweeps, PassState};
 pub use runs::{find, Run};
 pub use siblings::WIDTH;
 pub use together::{together, Together, Vectors};

@@ -68,12 +68,12 @@ pub fn nodes(op: &Op) -> impl Iterator<Item = u32> {
 }
 
 /// A program that computes the nodes `own`; other nodes it needs come from `place`.
-pub fn assemble(
+pub fn assemble<P, T: Copy>(
     graph: &Graph,
     own: &BTreeSet<u32>,
-    place: impl Fn(u32) -> Place,
-    results: &[(ProgramResult, Target)],
-) -> (Program, Vec<Place>, Vec<Target>) {
+    place: impl Fn(u32) -> P,
+    results: &[(ProgramResult, T)],
+) -> (Program, Vec<P>, Vec<T>) {
     let (mut inputs, mut steps, mut known) = (Vec::new(), Vec::new(), BTreeSet::new());
     let mut fetch = |id: u32, steps: &mut Vec<_>| {
         if !own.contains(&id) && known.insert(id) {

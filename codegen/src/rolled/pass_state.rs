@@ -27,16 +27,21 @@ impl<'g> OutputSweeps<'g> {
             Output::Energy => Some(SweepList::ENERGY.into()),
             Output::Momenta => Some(SweepList::MOMENTA.into()),
             Output::InverseDynamics | Output::Bias => Some(SweepList::INVERSE_DYNAMICS.into()),
-            Output::Accelerations => Some(SweepList::ACCELERATIONS.into()),
+            Output::Accelerations | Output::Multipliers => Some(SweepList::ACCELERATIONS.into()),
             Output::ProjectMomenta => Some(SweepList::PROJECT_MOMENTA.into()),
             Output::PositionCorrection => Some(SweepList::POSITION_CORRECTION.into()),
             _ => None,
         }
     }
 
+    /// The passes that a tree needs.
+    pub fn all_passes(&self, tree: &Tree<Expr<'g>>) -> Vec<Pass> {
+        mbd_runtime::sweep::pass::passes(&self.sweeps, tree)
+    }
+
     /// The passes that a tree needs, if links can carry all of its sweeps.
     pub fn passes(&self, tree: &Tree<Expr<'g>>) -> Option<Vec<Pass>> {
-        let passes = mbd_runtime::sweep::pass::passes(&self.sweeps, tree);
+        let passes = self.all_passes(tree);
         passes.iter().flat_map(|pass| &pass.sweeps).all(|&k| (self.sweeps[k].rolls)(tree)).then_some(passes)
     }
 }
@@ -96,7 +101,7 @@ impl<'g, 'a> PassState<'g, 'a> {
     ) {
         let accelerations = match self.output {
             Output::InverseDynamics => Accelerations::Given(&given.third),
-            Output::Accelerations => Accelerations::Chosen,
+            Output::Accelerations | Output::Multipliers => Accelerations::Chosen,
             _ => Accelerations::Zero,
         };
         let inputs = given.inputs();
@@ -153,9 +158,38 @@ impl<'g, 'a> PassState<'g, 'a> {
         self.each(pass, given, |sweep, cx| (sweep.carried)(cx, i, &mut visit));
     }
 
+    /// The same with the number of the sweep among those of the output, and that of the value among those of the sweep.
+    pub fn carried_by_sweeps(
+        &mut self,
+        pass: usize,
+        i: usize,
+        given: &SymbolicInputs<'g>,
+        mut visit: impl FnMut([usize; 2], &mut Expr<'g>),
+    ) {
+        let passes = self.passes;
+        self.with(given, |list, cx| {
+            for &k in &passes[pass].sweeps {
+                let mut number = 0;
+                (list.sweeps[k].carried)(cx, i, &mut |e| {
+                    visit([k, number], e);
+                    number += 1;
+                });
+            }
+        });
+    }
+
     /// Calls `visit` with what a pass carries whatever node it is at: sums over all nodes so far, and multipliers.
     pub fn running(&mut self, pass: usize, given: &SymbolicInputs<'g>, mut visit: impl FnMut(&mut Expr<'g>)) {
         self.each(pass, given, |sweep, cx| (sweep.running)(cx, &mut visit));
+    }
+
+    /// The solutions for the unknowns so far: which of the two linear problems (0: velocities, 1: accelerations), which
+    /// unknown, and its value.
+    pub fn unknowns(&mut self) -> impl Iterator<Item = (usize, usize, &mut Expr<'g>)> {
+        let both = [&mut self.work.velocity, &mut self.work.acceleration].into_iter().enumerate();
+        both.flat_map(|(level, solution)| {
+            solution.unknown_rate.iter_mut().enumerate().map(move |(unknown, value)| (level, unknown, value))
+        })
     }
 
     /// Results in the order of the generated function, after the last pass.
@@ -167,6 +201,7 @@ impl<'g, 'a> PassState<'g, 'a> {
             Output::PositionCorrection => [self.rows.as_slice(), &self.v, &self.pivots].concat(),
             Output::Momenta | Output::InverseDynamics | Output::Bias => self.p.clone(),
             Output::Energy => self.energy.to_vec(),
+            Output::Multipliers => self.work.constraints.multipliers.clone(),
             _ => self.v.clone(),
         }
     }

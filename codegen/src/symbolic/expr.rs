@@ -220,6 +220,23 @@ impl Graph {
         self.node(Op::Fma(Fma { a, b, c, minus_product: a_neg != b_neg, minus_addend }), false)
     }
 
+    /// An operation like another one on other operands, with its label and name.
+    pub fn like(&self, id: u32, op: Op) -> Expr<'_> {
+        let (_, label) = self.get(id);
+        self.label.set(label);
+        let first = |x: Operand| (matches!(x, Operand::Const(_)), x);
+        let op = match op {
+            Op::Add(a, b) if first(b) < first(a) => Op::Add(b, a),
+            Op::Mul(a, b) if b < a => Op::Mul(b, a),
+            op => op,
+        };
+        let made = self.node(op, false);
+        if let (Expr::Node { id: made, .. }, Some(name)) = (made, self.name_of(id)) {
+            self.set_name(made, name);
+        }
+        made
+    }
+
     fn node(&self, op: Op, neg: bool) -> Expr<'_> {
         let mut inner = self.inner.borrow_mut();
         let next = inner.ops.len() as u32;

@@ -65,6 +65,7 @@ pub fn place(
         sizes: sizes(plan, options, frames.len()),
         frames,
         sets: Vec::new(),
+        factored: Vec::new(),
         together: Vec::new(),
     };
     let (input, functions) = (Input { plan, options, programs: &programs }, programs.functions());

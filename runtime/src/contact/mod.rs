@@ -92,6 +92,8 @@ pub enum Way {
     Compiled,
     /// The interpreter.
     Interpreted,
+    /// Generated code that is put together from pieces for the modes of the contacts.
+    Factored,
 }
 
 /// Which rows of the constraints act in given modes of the contacts, of a mechanism with `rows` rows: those that are no

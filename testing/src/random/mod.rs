@@ -2,12 +2,14 @@
 
 mod bodies;
 mod builder;
+mod contacts;
 mod distribution;
 mod joints;
 mod model;
 mod rng;
 
 pub use bodies::matrix as rotation_matrix;
+pub use contacts::with_contacts;
 pub use distribution::Distribution;
 pub use model::random_model;
 pub use rng::Rng;

@@ -8,6 +8,7 @@ mod counts;
 mod eliminations;
 mod emitted;
 mod external;
+mod factored;
 mod fuzzed;
 mod machine_code;
 mod rewriting;

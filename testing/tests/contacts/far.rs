@@ -5,10 +5,9 @@ use std::rc::Rc;
 use std::time::Instant;
 
 use mbd_codegen::jit::Compiled;
-use mbd_codegen::model::{JointKind, Model};
+use mbd_codegen::model::JointKind;
 use mbd_codegen::options::Options;
 use mbd_codegen::plan::Plan;
-use mbd_codegen::read;
 use mbd_runtime::catalogue::{self, BoxedMethod};
 use mbd_runtime::constrained::{close, Closing, Effort, Projection, Stabilisation, WithPostStep};
 use mbd_runtime::contact::{
@@ -18,9 +17,8 @@ use mbd_runtime::integrate::{Solver, Step, Tolerances, Verner9};
 use mbd_runtime::system::{LieJoint, Row};
 use mbd_runtime::tree::Source;
 use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
-use mbd_testing::random::{random_model, Distribution, Rng};
+use mbd_testing::random::with_contacts;
 use mbd_testing::state::random_state;
-use mbd_testing::toml::to_toml;
 
 use super::scene::{model, Scene};
 
@@ -152,65 +150,11 @@ fn sizes(plan: &Plan, q: &[f64]) -> Vec<f64> {
     sizes
 }
 
-/// Text of a shape on a body, or on the ground where there is none.
-fn shape(rng: &mut Rng, name: &str, body: Option<&str>, kind: usize) -> String {
-    let kind = match kind {
-        0 => "type = \"point\"".to_string(),
-        1 => "type = \"sphere\"\nradius = 0.1".to_string(),
-        2 => "type = \"capsule\"\nradius = 0.05\nlength = 0.4".to_string(),
-        3 => "type = \"box\"\nsize = [0.3, 0.2, 0.5]".to_string(),
-        4 => "type = \"cylinder\"\nradius = 0.15\nlength = 0.3".to_string(),
-        5 => "type = \"ellipsoid\"\nsemi_axes = [0.1, 0.2, 0.3]".to_string(),
-        _ => "type = \"plane\"".to_string(),
-    };
-    let body = body.map_or(String::new(), |body| format!("body = \"{body}\"\n"));
-    let [xyz, rpy] = [0.3, 2.0].map(|size| [0; 3].map(|_| rng.around(size)));
-    format!("\n[[shape]]\nname = \"{name}\"\n{body}{kind}\nxyz = {xyz:?}\nrpy = {rpy:?}\n")
-}
-
-/// A random mechanism with some contacts between its bodies and the ground, and stops; `None` where no pair fits.
-fn mechanism(seed: u64) -> Option<Model> {
-    let distribution = Distribution {
-        kinds: [1.0; 9],
-        prescribed: 0.0,
-        params: 0.0,
-        wrenches: 0.0,
-        ..Distribution::everything(seed, 6)
-    };
-    let plain = random_model(seed, &distribution);
-    let mut rng = Rng::new(seed, 71);
-    let names: Vec<&str> = plain.bodies.iter().map(|body| body.name.as_str()).collect();
-    let mut text = to_toml(&plain);
-    // A pair that the description does not take is left out.
-    for k in 0..8 {
-        let second = rng.below(names.len());
-        let first = Some(rng.below(names.len() + 1)).filter(|i| *i < names.len());
-        if first == Some(second) {
-            continue;
-        }
-        let kinds = rng.pick(&[[6, 0], [6, 1], [6, 2], [6, 3], [6, 4], [6, 5], [1, 1], [2, 2], [3, 1], [4, 0]]);
-        let more = [
-            shape(&mut rng, &format!("s{k}a"), first.map(|i| names[i]), kinds[0]),
-            shape(&mut rng, &format!("s{k}b"), Some(names[second]), kinds[1]),
-            format!("\n[[contact]]\nname = \"c{k}\"\nbetween = [\"s{k}a\", \"s{k}b\"]\n"),
-        ]
-        .concat();
-        let tried = format!("{text}{more}");
-        if read::model("random.toml", &tried, &Default::default()).is_ok() {
-            text = tried;
-        }
-    }
-    read::model("random.toml", &text, &Default::default())
-        .ok()
-        .map(|read| read.model)
-        .filter(|m| !m.contacts.is_empty())
-}
-
 #[test]
 fn gaps_close_no_faster_than_their_bounds() {
     let (mut count, mut tightest) = (0, 0.0_f64);
     for seed in 0..300 {
-        let Some(model) = mechanism(seed) else { continue };
+        let Some(model) = with_contacts(seed) else { continue };
         let plan = Plan::new(&model, 1e-9);
         let mut mechanism = plan.default_contact_interpreter::<f64>();
         let reaches = mechanism.reaches().to_vec();

@@ -118,9 +118,9 @@ pub struct ContactStatistics {
     pub lost: f64,
     /// Largest relative residual of an impact.
     pub residual: f64,
-    /// Steps, by what computed their rates: code generated for the modes, generated code for all modes, code made at run
-    /// time, the interpreter ([`Way`]).
-    pub steps: [u64; 4],
+    /// Steps, by what computed their rates ([`Way`]): code generated for the modes, generated code for all modes, code made at
+    /// run time, the interpreter, generated code in pieces.
+    pub steps: [u64; 5],
 }
 
 /// Reason why a motion with contacts cannot go on.
