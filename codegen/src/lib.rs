@@ -9,6 +9,8 @@ pub mod diag;
 mod emit;
 mod error;
 pub mod generate;
+#[cfg(feature = "hulls")]
+mod hull;
 pub mod identifiable;
 mod import;
 mod inertia;
