@@ -149,12 +149,8 @@ fn follow(
     motion.run(&mut system, end, &mut events).map_err(failed)?;
     let seconds = clock.elapsed().as_secs_f64();
     let of = motion.statistics();
-    let cost = Cost {
-        steps: of.steps + of.rejections,
-        evaluations: of.evaluations,
-        events: events.0.len() as u64,
-        seconds,
-    };
+    let cost =
+        Cost { steps: of.steps + of.rejections, evaluations: of.evaluations, events: events.0.len() as u64, seconds };
     let mut q = q.clone();
     motion.state(&system, &mut q, &mut p);
     let impacts: f64 = events.0.iter().filter_map(|event| Some(event.impact?.energy)).sum();
@@ -180,7 +176,8 @@ fn free(plan: &Plan, (q, v): &(Vec<f64>, Vec<f64>), end: f64) -> Result<Cost, Fa
 fn pairs(args: &PairsArgs) -> Result<String, Failure> {
     let columns = [
         "balls",
-        "pairs and floor",
+        "contacts",
+        "ms to make",
         "without contacts: steps",
         "µs a step",
         "all far: steps",
@@ -195,6 +192,9 @@ fn pairs(args: &PairsArgs) -> Result<String, Failure> {
     let mut text = head(&format!("Balls that fall for 1 s, Dop853, tolerance {TOLERANCE:.0e}, interpreted"), &columns);
     for &count in &args.balls {
         let (bare, touching) = (balls(count, false, -9.81)?, balls(count, true, -9.81)?);
+        let clock = Instant::now();
+        drop(touching.default_contact_interpreter::<f64>());
+        let made = 1e3 * clock.elapsed().as_secs_f64();
         let contacts = touching.model.contacts.len();
         let alone = Cost::least(args, || free(&bare, &start(count, Place::Far), 1.0))?;
         let cost = |place| Cost::least(args, || Ok(follow(&touching, &start(count, place), 1.0, TOLERANCE)?.0));
@@ -202,6 +202,7 @@ fn pairs(args: &PairsArgs) -> Result<String, Failure> {
         let cells = [
             count.to_string(),
             contacts.to_string(),
+            format!("{made:.1}"),
             alone.steps.to_string(),
             alone.step(),
             far.steps.to_string(),
@@ -273,15 +274,7 @@ fn instants() -> Result<String, Failure> {
 
 /// Time over the number of corners of a hull.
 fn corners(args: &PairsArgs) -> Result<String, Failure> {
-    let columns = [
-        "corners",
-        "deepest, mm",
-        "far: steps",
-        "µs a step",
-        "thrown, 1 s: events",
-        "steps",
-        "µs a step",
-    ];
+    let columns = ["corners", "deepest, mm", "far: steps", "µs a step", "thrown, 1 s: events", "steps", "µs a step"];
     let mut text = head("A hull of 2000 points of an ellipsoid, 0.2 m, 0.15 m and 0.1 m", &columns);
     let point = |k: u32| {
         let (z, angle) = (1.0 - 2.0 * (f64::from(k) + 0.5) / 2000.0, 2.399_963_229_728_653 * f64::from(k));
@@ -301,9 +294,8 @@ fn corners(args: &PairsArgs) -> Result<String, Failure> {
         let told = reading.findings.to_string();
         let depth = told.split("up to ").nth(1).and_then(|rest| rest.split(" mm").next()).unwrap_or("0").to_string();
         let plan = Plan::new(&reading.model, 1e-9);
-        let state = |height: f64| {
-            (vec![0.0, 0.0, height, 0.1, 0.2, 0.3, 0.860_f64.sqrt()], vec![0.5, 0.2, 0.0, 2.0, 1.0, 0.5])
-        };
+        let state =
+            |height: f64| (vec![0.0, 0.0, height, 0.1, 0.2, 0.3, 0.860_f64.sqrt()], vec![0.5, 0.2, 0.0, 2.0, 1.0, 0.5]);
         let cost = |height| Cost::least(args, || Ok(follow(&plan, &state(height), 1.0, TOLERANCE)?.0));
         let (far, thrown) = (cost(100.0)?, cost(0.5)?);
         let cells = [
