@@ -194,7 +194,7 @@ fn distance(from: &Vec3, points: &[Vec3]) -> f64 {
             break;
         }
         let (nearer, between) = nearest(&simplex.with(next));
-        if !(dot(nearer, nearer) < dot(at, at)) {
+        if dot(nearer, nearer) >= dot(at, at) {
             break;
         }
         (at, simplex) = (nearer, between);

@@ -61,8 +61,8 @@ pub(crate) fn of_mesh(path: &Path, bytes: &[u8], scale: [f64; 3]) -> Result<Vec<
     for point in &mut points {
         (0..3).for_each(|k| point[k] *= scale[k]);
     }
-    let far = |point: &[f64; 3]| point.iter().any(|x| !(x.abs() <= FARTHEST));
-    match points.iter().filter(|point| far(point)).count() {
+    let near = |point: &[f64; 3]| point.iter().all(|x| x.abs() <= FARTHEST);
+    match points.iter().filter(|point| !near(point)).count() {
         0 => Ok(points),
         n => Err(Problem::whole(format!("{n} of its points are farther away than {FARTHEST:e} m"))),
     }
