@@ -292,7 +292,7 @@ mod tests {
                     let side = |k: usize| dot(minus(&points[k], &points[a]), normal);
                     let others = || (0..n).filter(|k| ![a, b, c].contains(k));
                     if others().all(|k| side(k) < 0.0) || others().all(|k| side(k) > 0.0) {
-                        [a, b, c].map(|k| is[k] = true);
+                        [a, b, c].iter().for_each(|k| is[*k] = true);
                     }
                 }
             }
