@@ -83,11 +83,11 @@ impl Hopper {
     pub const ROW_LEG_LOWER: usize = 3;
     /// Index of the first row of constraint `leg/upper`.
     pub const ROW_LEG_UPPER: usize = 4;
-    /// How fast each velocity can close the gap of each contact, contact by contact.
-    pub const REACHES: [::multibody::runtime::contact::Reach<f64>; 6] = [
-        ::multibody::runtime::contact::Reach { rate: 1.0, turn: 0.0, slide: 0.0 }, ::multibody::runtime::contact::Reach { rate: 0.0, turn: 0.0, slide: 0.0 },
-        ::multibody::runtime::contact::Reach { rate: 0.0, turn: 0.0, slide: 0.0 }, ::multibody::runtime::contact::Reach { rate: 1.0, turn: 0.0, slide: 0.0 },
-        ::multibody::runtime::contact::Reach { rate: 0.0, turn: 0.0, slide: 0.0 }, ::multibody::runtime::contact::Reach { rate: 1.0, turn: 0.0, slide: 0.0 },
+    /// How fast velocities can close the gaps of contacts, contact by contact: the velocities that can.
+    pub const REACHES: [::multibody::runtime::contact::Reach<f64>; 3] = [
+        ::multibody::runtime::contact::Reach { contact: 0, velocity: 0, rate: 1.0, turn: 0.0, slide: 0.0 },
+        ::multibody::runtime::contact::Reach { contact: 1, velocity: 1, rate: 1.0, turn: 0.0, slide: 0.0 },
+        ::multibody::runtime::contact::Reach { contact: 2, velocity: 1, rate: 1.0, turn: 0.0, slide: 0.0 },
     ];
     /// Names of the contacts.
     pub const CONTACTS: [&'static str; 3] = ["landing", "leg/lower", "leg/upper"];

@@ -10,6 +10,8 @@ mod emit;
 mod error;
 pub mod factored;
 pub mod generate;
+#[cfg(feature = "hulls")]
+mod hull;
 pub mod identifiable;
 mod import;
 mod inertia;

@@ -40,8 +40,8 @@ pub struct Variant {
 /// `<robot>` (URDF) or a `<mujoco>` (MJCF) in it.
 ///
 /// `file` names the source in the findings and in the origins of the model, and gives the model its name if the text
-/// does not. Of other files, only the `[base]` that a TOML text names, and the included files and meshes of an MJCF text are read, from
-/// their paths relative to the folder of `file`.
+/// does not. Of other files, only the `[base]` and the meshes that a TOML text names, the included files and meshes of an MJCF text, and,
+/// with a floor, the meshes of a URDF text are read, from their paths relative to the folder of `file`.
 ///
 /// # Errors
 /// All findings at once, in the order of the text, where one of them is an error.
@@ -166,8 +166,8 @@ pub fn read_bytes(path: &Path) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// [`load_all`], with the `[base]` of a TOML text and the files that an MJCF text names read by `files`, to which their
-/// paths are given as they are relative to `file`.
+/// [`load_all`], with the files that a text names read by `files`, to which their paths are given as they are relative to
+/// `file`.
 pub fn load_with(
     file: &str,
     text: &str,
@@ -211,10 +211,10 @@ fn raw_model(
     const KNOWN: &str = "models are read from `.toml`, `.urdf` and `.xml` files";
     match extension.as_deref() {
         Some("toml") => toml::read(text, options, findings, files),
-        Some("urdf") => urdf::read(text, options, findings),
+        Some("urdf") => urdf::read(text, options, findings, (Path::new(file), files)),
         Some("mjcf") => mjcf::read(text, options, findings, files),
         Some("xml") => match XmlFormat::of(text) {
-            Some(XmlFormat::Urdf) => urdf::read(text, options, findings),
+            Some(XmlFormat::Urdf) => urdf::read(text, options, findings, (Path::new(file), files)),
             Some(XmlFormat::Mjcf) => mjcf::read(text, options, findings, files),
             None => refuse("no `<robot>` or `<mujoco>` in this file", "of XML formats, URDF and MJCF are read"),
         },

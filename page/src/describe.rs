@@ -80,13 +80,17 @@ fn shapes(scene: &Scene, colours: &[usize], frame: &dyn Fn(Option<usize>) -> Str
     let model = &scene.plan.model;
     let of = |x: Value| value(model, x);
     list(model.shapes.iter().filter_map(|shape| {
-        let dims = match shape.kind {
+        let dims = match &shape.kind {
             ShapeKind::Point => return None,
-            ShapeKind::Sphere { radius } => vec![radius],
-            ShapeKind::Capsule { radius, length } | ShapeKind::Cylinder { radius, length } => vec![radius, length],
+            ShapeKind::Sphere { radius } => vec![*radius],
+            ShapeKind::Capsule { radius, length } | ShapeKind::Cylinder { radius, length } => vec![*radius, *length],
             ShapeKind::Box { size } => size.to_vec(),
             ShapeKind::Ellipsoid { semi_axes } => semi_axes.to_vec(),
             ShapeKind::Plane { normal } => normal.to_vec(),
+            // How far it extends along its axes.
+            ShapeKind::Hull { points } => {
+                [0, 1, 2].map(|k| points.iter().fold(0.0, |most: f64, p| most.max(2.0 * p[k].abs()))).to_vec()
+            }
         };
         let rotation = flesh::rotation(&shape.mount.placement.rotation, &of);
         let pose = rotation.into_iter().flatten().chain(shape.mount.placement.xyz.map(of));

@@ -399,11 +399,15 @@ fn later<S: Scalar>(tree: &Tree<S>) -> Vec<Vec<usize>> {
         order.extend(node.elimination.solve_before.iter().chain(&node.elimination.solve_after).copied());
     }
     order.extend(&tree.solve_at_ground);
+    let mut place = vec![usize::MAX; tree.unknowns.len()];
+    order.iter().enumerate().for_each(|(k, g)| place[*g] = k);
+    // What is coupled to one of them becomes coupled to each other. The next one of those to be eliminated hands that on, so
+    // that a model of many rows is not a matter of the cube of their number.
     for &g in &order {
+        meets[g].retain(|h| place[*h] > place[g]);
         let rest: Vec<usize> = meets[g].iter().copied().collect();
-        for &h in &rest {
-            meets[h].remove(&g);
-            meets[h].extend(rest.iter().copied().filter(|&k| k != h));
+        if let Some(&next) = rest.iter().min_by_key(|h| place[**h]) {
+            meets[next].extend(rest.into_iter().filter(|h| *h != next));
         }
     }
     meets.into_iter().map(|set| set.into_iter().collect()).collect()

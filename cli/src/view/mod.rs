@@ -11,7 +11,8 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use multibody::codegen::read::{load_with, Base, Floor, ImportOptions};
+use multibody::codegen::model::ShapeKind;
+use multibody::codegen::read::{load_with, to_toml, Base, Floor, ImportOptions};
 use serde_json::json;
 
 use super::args::ViewArgs;
@@ -86,9 +87,21 @@ impl Given {
             let help = "convert the model with these options first: `mbd convert MODEL --gravity .. -o model.toml`";
             return Err(Failure::new("the page takes neither --gravity nor --base planar", help));
         }
-        let name = file_name(path);
+        let mut name = file_name(path);
         let mut files = included.into_inner();
-        files.insert(name.clone(), text.into_bytes());
+        // The page makes no hulls: it is given their corners.
+        let hulls = model.shapes.iter().any(|shape| matches!(shape.kind, ShapeKind::Hull { .. }));
+        match hulls.then(|| to_toml(&path.to_string_lossy(), &text, &options, &source::base)) {
+            Some(Ok((converted, _))) => {
+                name = Path::new(&name).with_extension("toml").to_string_lossy().into_owned();
+                files = BTreeMap::from([(name.clone(), converted.into_bytes())]);
+            }
+            Some(Err(_)) => {
+                note(format_args!("{}: notice: the page leaves out hulls of meshes", path.display()));
+                files.insert(name.clone(), text.into_bytes());
+            }
+            None => drop(files.insert(name.clone(), text.into_bytes())),
+        }
         let floating = options.base == Base::Floating;
         Ok(Given { title: Some(model.name), name: Some(name), files, floating, floor: args.floor })
     }

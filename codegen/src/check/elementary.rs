@@ -6,7 +6,7 @@ use crate::model::{LoopKind, Mount, Placement, ShapeKind, Value};
 /// What [`elementary`] has, for messages.
 pub(super) const SUPPORTED: &str =
     "a `plane` can touch shapes of every other kind, a `sphere` or `point` those but an \
-     `ellipsoid`, a `sphere` or `capsule` also one of its own";
+     `ellipsoid` or a `hull`, a `sphere` or `capsule` also one of its own";
 
 /// One place where two shapes can touch: a loop between two frames, which stand at these origins in the axes of the
 /// shapes, not turned.
@@ -25,35 +25,38 @@ const Z: [f64; 3] = [0.0, 0.0, 1.0];
 
 /// The places where the first shape can touch the second; `None` for pairs that are not supported in this order.
 pub(super) fn elementary(first: &ShapeKind, second: &ShapeKind) -> Option<Vec<Elementary>> {
-    let places = match (*first, *second) {
-        (ShapeKind::Plane { normal }, ShapeKind::Point) => vec![ball(normal, 0.0, MIDDLE)],
-        (ShapeKind::Plane { normal }, ShapeKind::Sphere { radius }) => vec![ball(normal, radius, MIDDLE)],
+    let places = match (first, second) {
+        (ShapeKind::Plane { normal }, ShapeKind::Point) => vec![ball(*normal, 0.0, MIDDLE)],
+        (ShapeKind::Plane { normal }, ShapeKind::Sphere { radius }) => vec![ball(*normal, *radius, MIDDLE)],
         (ShapeKind::Plane { normal }, ShapeKind::Capsule { radius, length }) => {
-            ends(length).into_iter().map(|at| ball(normal, radius, at)).collect()
+            ends(*length).into_iter().map(|at| ball(*normal, *radius, at)).collect()
         }
         (ShapeKind::Plane { normal }, ShapeKind::Box { size }) => {
-            corners(size).into_iter().map(|at| ball(normal, 0.0, at)).collect()
+            corners(*size).into_iter().map(|at| ball(*normal, 0.0, at)).collect()
+        }
+        (ShapeKind::Plane { normal }, ShapeKind::Hull { points }) => {
+            points.iter().map(|at| ball(*normal, 0.0, *at)).collect()
         }
         (ShapeKind::Plane { normal }, ShapeKind::Cylinder { radius, length }) => {
-            let kind = LoopKind::RollingDisc { normal, axis: Z, radius: Value::Const(radius) };
-            ends(length).into_iter().map(|at| Elementary { kind, first: MIDDLE, second: at }).collect()
+            let kind = LoopKind::RollingDisc { normal: *normal, axis: Z, radius: Value::Const(*radius) };
+            ends(*length).into_iter().map(|at| Elementary { kind, first: MIDDLE, second: at }).collect()
         }
         (ShapeKind::Plane { normal }, ShapeKind::Ellipsoid { semi_axes }) => {
-            vec![middles(LoopKind::RollingEllipsoid { normal, semi_axes: semi_axes.map(Value::Const) })]
+            vec![middles(LoopKind::RollingEllipsoid { normal: *normal, semi_axes: semi_axes.map(Value::Const) })]
         }
-        (ShapeKind::Sphere { radius: first }, second) => vec![balls(first, ball_of(&second)?)],
+        (ShapeKind::Sphere { radius: first }, second) => vec![balls(*first, ball_of(second)?)],
         (ShapeKind::Capsule { radius: first, length }, ShapeKind::Capsule { radius: second, length: other }) => {
-            vec![capsules([length, other], [first, second])]
+            vec![capsules([*length, *other], [*first, *second])]
         }
         (ShapeKind::Capsule { radius: first, length }, second) => {
-            vec![capsules([length, 0.0], [first, ball_of(&second)?])]
+            vec![capsules([*length, 0.0], [*first, ball_of(second)?])]
         }
         (ShapeKind::Box { size }, second) => {
-            let radius = Value::Const(ball_of(&second)?);
+            let radius = Value::Const(ball_of(second)?);
             vec![middles(LoopKind::RollingBallOnBox { size: size.map(Value::Const), radius })]
         }
         (ShapeKind::Cylinder { radius: first, length }, second) => {
-            let (length, radii) = (Value::Const(length), [first, ball_of(&second)?].map(Value::Const));
+            let (length, radii) = (Value::Const(*length), [*first, ball_of(second)?].map(Value::Const));
             vec![middles(LoopKind::RollingBallOnCylinder { axis: Z, length, radii })]
         }
         _ => return None,
@@ -149,7 +152,8 @@ mod tests {
         assert_eq!(count(ShapeKind::Cylinder { radius, length }), Some(2));
         assert_eq!(count(ShapeKind::Cylinder { radius, length: 0.0 }), Some(1));
         assert_eq!(count(ShapeKind::Ellipsoid { semi_axes: [0.1, 0.2, 0.3] }), Some(1));
-        assert_eq!(count(plane), None);
+        assert_eq!(count(ShapeKind::Hull { points: vec![[0.0; 3]; 5] }), Some(5));
+        assert_eq!(count(plane.clone()), None);
         let sphere = ShapeKind::Sphere { radius };
         let wide = ShapeKind::Sphere { radius: 0.3 };
         assert_eq!(elementary(&sphere, &wide), Some(vec![balls(0.1, 0.3)]));
@@ -169,6 +173,7 @@ mod tests {
             ShapeKind::Box { size: [1.0; 3] },
             ShapeKind::Cylinder { radius, length },
             ShapeKind::Ellipsoid { semi_axes: [0.1, 0.2, 0.3] },
+            ShapeKind::Hull { points: vec![[0.0; 3], [1.0; 3]] },
         ];
         for (i, a) in shapes.iter().enumerate() {
             for (j, b) in shapes.iter().enumerate() {

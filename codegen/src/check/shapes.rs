@@ -33,12 +33,17 @@ fn shape(raw: &RawShape, names: &Names, numbers: &mut Numbers) -> Option<Shape> 
 /// Reports dimensions that are superfluous or missing.
 fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) {
     let word = a(spec.word());
+    let of_hull = |key: &str| raw.hull.as_ref()?.keys.iter().find(|(k, _)| *k == key).map(|(_, span)| *span);
     let given = [
         ("radius", raw.radius.as_ref().map(|x| x.span), "`radius = ..`, in metres"),
         ("length", raw.length.as_ref().map(|x| x.span), "`length = ..`, along its z axis in metres"),
         ("size", raw.size.as_ref().map(|x| x.span), "`size = [x, y, z]`, the lengths of its edges in metres"),
         ("semi_axes", raw.semi_axes.as_ref().map(|x| x.span), "`semi_axes = [x, y, z]`, in metres"),
         ("normal", raw.normal.as_ref().map(|x| x.span), ""),
+        ("points", of_hull("points"), ""),
+        ("file", of_hull("file"), ""),
+        ("scale", of_hull("scale"), ""),
+        ("most", of_hull("most"), ""),
     ];
     for (key, span, example) in given {
         match (span, spec.keys.contains(&key)) {
@@ -49,12 +54,16 @@ fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) 
                 numbers.findings.error(span, format!("{what}: {word} has no `{key}`"), help);
             }
             // A plane without a normal is across z.
-            (None, true) if key != "normal" => {
+            (None, true) if !example.is_empty() => {
                 let message = format!("{what}: {word} needs a `{key}`");
                 numbers.findings.error(raw.name.span, message, format!("add {example}"));
             }
             _ => {}
         }
+    }
+    if spec.word() == "hull" && of_hull("points").or(of_hull("file")).is_none() {
+        let help = "add `points = [[x, y, z], ..]`, in metres, or `file = \"mesh.stl\"`, an STL or OBJ file";
+        numbers.findings.error(raw.name.span, format!("{what}: a hull needs `points` or a `file`"), help);
     }
 }
 
@@ -87,6 +96,13 @@ fn kind(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) -> 
             let axes = raw.semi_axes.as_ref()?;
             let semi_axes = [0, 1, 2].map(|k| size(&axes.value[k], "semi_axes", MORE, what, numbers));
             Some(ShapeKind::Ellipsoid { semi_axes })
+        }
+        "hull" => {
+            let points = raw.hull.as_ref()?.corners.clone()?;
+            let at = raw.hull.as_ref()?.keys.first().map_or(raw.name.span, |(_, span)| *span);
+            let far = points.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+            numbers.value(&RawNumber::constant(far, at), Quantity::Length, &format!("{what}: a point"));
+            Some(ShapeKind::Hull { points })
         }
         _ => {
             let normal = raw.normal.as_ref().map(|n| numbers.direction(n, &format!("{what}: `normal`")));

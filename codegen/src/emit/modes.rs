@@ -1,6 +1,7 @@
 //! Code for the modes of contacts: functions for each set of modes behind one function for each output, and the trait
 //! through which motions with contacts use the type.
 
+use std::collections::HashSet;
 use std::fmt::Write;
 
 use mbd_runtime::contact::{work_len, Contact, Mode, Reach, RestitutionLaw};
@@ -142,21 +143,23 @@ impl<'a> Contacts<'a> {
         let mut reaches = plan.tree(&defaults).reaches(&self.contacts);
         // What depends on parameters is not a number without them. It has no bound here.
         let without = plan.tree(&vec![f64::NAN; defaults.len()]).reaches(&self.contacts);
-        for (row, without) in reaches.chunks_mut(plan.dims.nv.max(1)).zip(without.chunks(plan.dims.nv.max(1))) {
-            let known = without.iter().all(|x| (x.rate + x.turn + x.slide).is_finite());
-            row.iter_mut().filter(|_| !known).for_each(|x| x.rate = f64::INFINITY);
-        }
+        let unknown = without.iter().filter(|x| !(x.rate + x.turn + x.slide).is_finite());
+        let unknown: HashSet<usize> = unknown.map(|x| x.contact).collect();
+        reaches.iter_mut().filter(|x| unknown.contains(&x.contact)).for_each(|x| x.rate = f64::INFINITY);
         let _ = writeln!(
             out,
-            "    /// How fast each velocity can close the gap of each contact, contact by contact.\n    \
+            "    /// How fast velocities can close the gaps of contacts, contact by contact: the velocities that can.\n    \
              pub const REACHES: [{rt}::contact::Reach<{}>; {}] = [",
             precision.name(),
             reaches.len()
         );
-        for row in reaches.chunks(plan.dims.nv.max(1)) {
+        for row in reaches.chunk_by(|a, b| a.contact == b.contact) {
             let entry = |x: &Reach<f64>| {
                 let [rate, turn, slide] = [x.rate, x.turn, x.slide].map(number);
-                format!("{rt}::contact::Reach {{ rate: {rate}, turn: {turn}, slide: {slide} }}")
+                let Reach { contact, velocity, .. } = x;
+                format!(
+                    "{rt}::contact::Reach {{ contact: {contact}, velocity: {velocity}, rate: {rate}, turn: {turn}, slide: {slide} }}"
+                )
             };
             let _ = writeln!(out, "        {},", row.iter().map(entry).collect::<Vec<_>>().join(", "));
         }

@@ -1,6 +1,8 @@
 //! Readers of file formats: text to [`raw::RawModel`]. Nothing outside this module knows the formats.
 
 mod floor;
+mod hull;
+mod mesh;
 pub mod mjcf;
 pub mod raw;
 pub mod source;

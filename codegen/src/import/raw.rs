@@ -330,6 +330,35 @@ pub struct RawShape {
     pub semi_axes: Option<RawVec3>,
     /// Direction across a plane; z where `None`.
     pub normal: Option<Spanned<[f64; 3]>>,
+    /// What a hull is made of.
+    pub hull: Option<RawHull>,
+}
+
+/// The corners of a hull, with the entries that they were read from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawHull {
+    /// The keys that stand there, with their places.
+    pub keys: Vec<(&'static str, Span)>,
+    /// Corners, m; `None` where something was reported, or there are no points.
+    pub corners: Option<Vec<[f64; 3]>>,
+}
+
+impl RawShape {
+    /// A shape without dimensions, on the ground, about its origin.
+    pub fn new(name: Spanned<String>, kind: Option<Spanned<&'static ShapeSpec>>) -> RawShape {
+        RawShape {
+            name,
+            body: None,
+            kind,
+            placement: RawPlacement::default(),
+            radius: None,
+            length: None,
+            size: None,
+            semi_axes: None,
+            normal: None,
+            hull: None,
+        }
+    }
 }
 
 /// What surfaces do to each other when they touch.

@@ -236,7 +236,7 @@ impl<'a> Findings<'a> {
         let mut rank: HashMap<String, usize> = HashMap::new();
         for d in self.list.iter().filter(|d| *d.file != **file) {
             if !rank.contains_key(&d.file) {
-                rank.insert(d.file.clone(), named(d).map_or(0, |k| k + 1));
+                rank.insert(d.file.clone(), named(d).map_or(usize::MAX, |k| k + 1));
             }
         }
         self.list.sort_by_key(|d| (rank.get(&d.file).copied().unwrap_or(0), d.line, d.column));

@@ -4,8 +4,8 @@ use std::collections::{HashMap, HashSet};
 
 use crate::names::identifier;
 
-/// As many contacts as a shape has with a plane: the corners of a box.
-const CONTACTS: usize = 8;
+/// As many contacts as a shape other than a hull has with a plane: the corners of a box.
+pub(crate) const CORNERS: usize = 8;
 
 /// The names of one family that were given.
 #[derive(Default)]
@@ -17,11 +17,11 @@ pub(crate) struct Taken {
 
 impl Taken {
     /// The name of a shape: `wanted`, with a number where an identifier that it becomes is taken: its own, or one of its
-    /// contacts, which are numbered.
-    pub(crate) fn shape(&mut self, wanted: &str) -> String {
+    /// `contacts` with a plane, which are numbered.
+    pub(crate) fn shape(&mut self, wanted: &str, contacts: usize) -> String {
         let identifiers = |name: &str| {
             let own = identifier(name);
-            (1..=CONTACTS).map(|k| format!("{own}_{k}")).chain([own.clone()]).collect()
+            (1..=contacts).map(|k| format!("{own}_{k}")).chain([own.clone()]).collect()
         };
         self.free(wanted, "_shape_", identifiers)
     }

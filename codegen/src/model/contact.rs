@@ -29,7 +29,7 @@ pub struct Contact {
 }
 
 /// Kinds of shapes, in the shape's own axes, with its origin in their middle.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum ShapeKind {
     /// The origin alone.
     Point,
@@ -67,6 +67,11 @@ pub enum ShapeKind {
         /// Direction out of it, of any length but zero.
         normal: [f64; 3],
     },
+    /// The convex hull of points.
+    Hull {
+        /// Its corners, m.
+        points: Vec<[f64; 3]>,
+    },
 }
 
 /// The properties of a kind of shape.
@@ -75,12 +80,13 @@ pub enum ShapeKind {
 pub struct ShapeSpec {
     /// Its words.
     pub words: Words,
-    /// Keys of its dimensions: `radius`, `length`, `size`, `semi_axes` or `normal`.
+    /// Keys of its dimensions: `radius`, `length`, `size`, `semi_axes` `normal`, `points`,
+    /// `file`, `scale` or `most`.
     pub keys: &'static [&'static str],
 }
 
 /// Every kind of shape, in the order of the variants of [`ShapeKind`].
-pub static SHAPES: [ShapeSpec; 7] = [
+pub static SHAPES: [ShapeSpec; 8] = [
     ShapeSpec { words: Words::new("point", &[], &["vertex", "corner"]), keys: &[] },
     ShapeSpec { words: Words::new("sphere", &[], &["ball"]), keys: &["radius"] },
     ShapeSpec { words: Words::new("capsule", &[], &["pill"]), keys: &["radius", "length"] },
@@ -88,6 +94,10 @@ pub static SHAPES: [ShapeSpec; 7] = [
     ShapeSpec { words: Words::new("cylinder", &[], &["disc", "disk", "wheel"]), keys: &["radius", "length"] },
     ShapeSpec { words: Words::new("ellipsoid", &[], &["egg", "spheroid"]), keys: &["semi_axes"] },
     ShapeSpec { words: Words::new("plane", &[], &["floor", "wall", "half_space", "halfspace"]), keys: &["normal"] },
+    ShapeSpec {
+        words: Words::new("hull", &[], &["mesh", "convex", "convex_hull", "polyhedron"]),
+        keys: &["points", "file", "scale", "most"],
+    },
 ];
 
 impl ShapeSpec {
@@ -108,6 +118,7 @@ impl ShapeKind {
             ShapeKind::Cylinder { .. } => 4,
             ShapeKind::Ellipsoid { .. } => 5,
             ShapeKind::Plane { .. } => 6,
+            ShapeKind::Hull { .. } => 7,
         };
         &SHAPES[index]
     }
@@ -144,6 +155,7 @@ mod tests {
             ShapeKind::Cylinder { radius, length },
             ShapeKind::Ellipsoid { semi_axes: [1.0, 2.0, 3.0] },
             ShapeKind::Plane { normal },
+            ShapeKind::Hull { points: vec![[0.0; 3]] },
         ];
         assert_eq!(all.map(|kind| *kind.spec()), SHAPES);
         Words::assert_distinct(SHAPES.iter().map(|spec| &spec.words));

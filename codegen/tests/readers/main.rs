@@ -3,6 +3,7 @@
 mod base;
 mod broken;
 mod convert;
+mod hulls;
 mod large;
 mod mjcf;
 mod mutate;

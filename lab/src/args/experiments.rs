@@ -25,6 +25,8 @@ pub enum Experiment {
     Breaking(BreakingArgs),
     /// Boxes and legs that are thrown on the floor: events, errors, gaps, energy
     Drops(DropsArgs),
+    /// What contacts cost by the number of pairs and of corners of hulls, and how well their times are found
+    Pairs(PairsArgs),
     /// Time of an evaluation over the number of links of open, branched and closed chains: figures 7.4 to 7.6
     Scaling(ScalingArgs),
 }
@@ -72,6 +74,20 @@ pub struct DropsArgs {
     /// Start of the random numbers
     #[arg(long, value_name = "N", default_value_t = 7)]
     pub seed: u64,
+}
+
+/// `mbd-lab experiments pairs`.
+#[derive(Args)]
+pub struct PairsArgs {
+    /// Numbers of balls
+    #[arg(long, value_name = "N", value_delimiter = ',', default_values_t = [1, 2, 4, 8, 16, 32, 60])]
+    pub balls: Vec<usize>,
+    /// Numbers of corners of a hull
+    #[arg(long, value_name = "N", value_delimiter = ',', default_values_t = [8, 16, 32, 64, 128])]
+    pub corners: Vec<usize>,
+    /// One run of each motion, in place of the fastest within a second
+    #[arg(long)]
+    pub quick: bool,
 }
 
 /// `mbd-lab experiments scaling`.

@@ -7,6 +7,7 @@ mod clock;
 mod drops;
 mod forms;
 mod mechanism;
+mod pairs;
 mod plain;
 mod scaling;
 mod study;
@@ -27,6 +28,7 @@ pub fn run(args: &ExperimentsArgs, out: &mut dyn Write) -> Outcome {
         Experiment::Biped(args) => biped::run(args, out),
         Experiment::Breaking(args) => breaking::run(args, out),
         Experiment::Drops(args) => drops::run(args, out),
+        Experiment::Pairs(args) => pairs::run(args, out),
         Experiment::Scaling(args) => scaling::run(args, out),
     }
 }

@@ -248,6 +248,24 @@ fn thrown_boxes_come_to_the_floor_and_stay_above_it() {
 }
 
 #[test]
+fn pairs_and_corners_have_a_cost_and_instants_their_closed_forms() {
+    let text = out(&good(run(&["experiments", "pairs", "--quick", "--balls", "3", "--corners", "8,12"]))).to_string();
+    let row = cells(&text, "Balls that fall", "3");
+    // Three pairs, and the floor three times. Nothing is looked at where all are far.
+    assert_eq!((row[2].as_str(), &row[4]), ("6", &row[6]), "{text}");
+    assert!(number(&row[11]) > 5.0, "{text}");
+    for offset in ["0", "0.5", "0.999999"] {
+        let row = cells(&text, "A ball of radius", offset);
+        assert!(row[3] == "1" && number(&row[4]) < 1e-14, "{text}");
+    }
+    assert_eq!(cells(&text, "A ball of radius", "1.000001")[3..5], ["0", "passes"], "{text}");
+    let bounces = cells(&text, "A ball is dropped", "1e-9");
+    assert!(bounces[3] == "6" && number(&bounces[4]) < 1e-12 && number(&bounces[5]) < 1e-9, "{text}");
+    let [few, more] = ["8", "12"].map(|corners| number(&cells(&text, "A hull of 2000 points", corners)[2]));
+    assert!(more < few, "{text}");
+}
+
+#[test]
 fn the_interpreter_is_called() {
     let mechanism = ["interpreter", "--mechanisms", "double_pendulum", "--calls", "3"];
     assert_eq!(out(&good(run(&mechanism))), "");

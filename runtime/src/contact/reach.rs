@@ -76,10 +76,10 @@ impl<S: Real> Node<S> {
 }
 
 impl<S: Real> Tree<S> {
-    /// How fast each velocity can close the gap of each contact, contact by contact.
+    /// How fast velocities can close the gaps of contacts, contact by contact: the velocities that can.
     pub fn reaches(&self, contacts: &[Contact<S>]) -> Vec<Reach<S>> {
         let mut all = Vec::new();
-        for contact in contacts {
+        for (k, contact) in contacts.iter().enumerate() {
             let mut table = vec![[0.0; 3]; self.dims.nv];
             match self.constraints.iter().find(|c| c.first == contact.row).map(|c| &c.bond) {
                 Some(Bond::Cut(cut)) => self.reach_of_cut(cut, &mut table),
@@ -97,11 +97,11 @@ impl<S: Real> Tree<S> {
                 }
                 None => unbounded(&mut table),
             }
-            let reach = |x: [f64; 3]| {
+            let moves = table.into_iter().enumerate().filter(|(_, x)| *x != [0.0; 3]);
+            all.extend(moves.map(|(velocity, x)| {
                 let [rate, turn, slide] = x.map(S::constant);
-                Reach { rate, turn, slide }
-            };
-            all.extend(table.into_iter().map(reach));
+                Reach { contact: k, velocity, rate, turn, slide }
+            }));
         }
         all
     }

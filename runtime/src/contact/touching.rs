@@ -11,6 +11,10 @@ use crate::Scalar;
 /// the coordinates that belong to them. That holds in body axes and in outer ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reach<S> {
+    /// The contact.
+    pub contact: usize,
+    /// The velocity.
+    pub velocity: usize,
     /// Rate of the gap per unit of the velocity where no translation lengthens an arm, m (rad for stops of rotations).
     /// Infinite where prescribed motions move the bodies.
     pub rate: S,
@@ -37,8 +41,8 @@ pub trait Touching: Constrained<Scalar: Real> {
     fn per_contact<T: Copy + core::fmt::Debug>(&self, value: T) -> Self::PerContact<T>;
     /// Memory for the inverse inertia of the contacts: at least `len` zeros, where `len` is what the solver asks for.
     fn zero_delassus(&self, len: usize) -> Self::Delassus;
-    /// How fast each velocity can close the gap of each contact, `nv` entries for each contact. What cannot have come together
-    /// in a step is not looked at.
+    /// How fast velocities can close gaps: an entry for each velocity that moves a contact's bodies, those of the first contact
+    /// first. What cannot have come together in a step is not looked at; a contact without an entry always is.
     fn reaches(&self) -> &[Reach<Self::Scalar>];
     /// What computes the rates in the modes that were set last.
     fn way(&self) -> Way;

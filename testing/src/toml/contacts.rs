@@ -16,7 +16,7 @@ impl Writer<'_> {
             }
             line(out, "type", quoted(shape.kind.word()));
             self.placement(out, &shape.mount.placement);
-            match shape.kind {
+            match &shape.kind {
                 ShapeKind::Point => {}
                 ShapeKind::Sphere { radius } => line(out, "radius", format!("{radius:?}")),
                 ShapeKind::Capsule { radius, length } | ShapeKind::Cylinder { radius, length } => {
@@ -26,6 +26,10 @@ impl Writer<'_> {
                 ShapeKind::Box { size } => line(out, "size", format!("{size:?}")),
                 ShapeKind::Ellipsoid { semi_axes } => line(out, "semi_axes", format!("{semi_axes:?}")),
                 ShapeKind::Plane { normal } => line(out, "normal", format!("{normal:?}")),
+                ShapeKind::Hull { points } => {
+                    line(out, "points", format!("{points:?}"));
+                    line(out, "most", format!("{}", points.len().max(4)));
+                }
             }
         }
     }

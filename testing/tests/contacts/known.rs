@@ -191,7 +191,7 @@ fn a_box_that_is_dropped_comes_to_rest() {
 }
 
 /// A generator of numbers between −1 and 1.
-fn random(seed: u64) -> impl FnMut() -> f64 {
+pub(super) fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -3,6 +3,7 @@
 mod answers;
 mod edges;
 mod far;
+mod hulls;
 mod known;
 mod models;
 mod round;

@@ -10,7 +10,7 @@ use super::tree::Part;
 use crate::diag::Severity;
 use crate::import::raw::{RawNumber, RawShape};
 use crate::import::source::{Span, Spanned};
-use crate::import::taken::Taken;
+use crate::import::taken::{Taken, CORNERS};
 use crate::import::words::quote;
 use crate::import::xml::{place, Reader};
 use crate::model::SHAPES;
@@ -279,18 +279,10 @@ impl Geom<'_> {
         let number = |x: f64| Some(RawNumber::constant(x, span));
         let [a, b, c] = self.size;
         let kind = SHAPES.iter().find(|spec| spec.word() == self.kind)?;
-        let name = taken.shape(element.name().map_or(body.value.as_str(), |name| name.value));
-        let mut shape = RawShape {
-            name: Spanned::new(name, element.name().map_or(span, |name| name.span)),
-            body: Some(body.clone()),
-            kind: Some(Spanned::new(kind, span)),
-            placement: self.pose.raw(span),
-            radius: None,
-            length: None,
-            size: None,
-            semi_axes: None,
-            normal: None,
-        };
+        let name = taken.shape(element.name().map_or(body.value.as_str(), |name| name.value), CORNERS);
+        let name = Spanned::new(name, element.name().map_or(span, |name| name.span));
+        let mut shape = RawShape::new(name, Some(Spanned::new(kind, span)));
+        (shape.body, shape.placement) = (Some(body.clone()), self.pose.raw(span));
         match self.kind {
             "sphere" => shape.radius = number(a),
             "capsule" | "cylinder" => (shape.radius, shape.length) = (number(a), number(2.0 * b)),

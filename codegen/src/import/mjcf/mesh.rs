@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::classes::{Classes, MAIN};
 use super::element::{choice, flag, numbers, parsed, vec3, Element};
 use super::pose::{normalised, rotate, Pose, Quat, NONE};
+use crate::import::mesh::{self, corners, msh, stl, Triangle, MOST};
 use crate::import::source::Spanned;
 use crate::import::words::quote;
 use crate::import::xml::{place, Reader};
@@ -33,12 +34,6 @@ const ATTRIBUTES: &[&str] = &[
     "params",
     "material",
 ];
-
-/// Most triangles of a mesh.
-const MOST: usize = 2_000_000;
-
-/// A triangle by its corners, m.
-type Triangle = [[f64; 3]; 3];
 
 /// The homogeneous body that a mesh bounds.
 #[derive(Clone, Copy, Debug)]
@@ -205,87 +200,21 @@ fn inline(reader: &mut Reader, element: &Element, whose: &str) -> Result<Vec<Tri
     corners(&vertices, faces)
 }
 
-/// Triangles from indices of vertices.
-fn corners(vertices: &[[f64; 3]], faces: impl Iterator<Item = [usize; 3]>) -> Result<Vec<Triangle>, String> {
-    let mut all = Vec::new();
-    for face in faces.take(MOST) {
-        let corner = |k: usize| vertices.get(face[k]).copied();
-        let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) else {
-            return Err("a face has a vertex that there is not".into());
-        };
-        all.push([a, b, c]);
-    }
-    Ok(all)
-}
-
-/// Three numbers of single precision, in the byte order of these files.
-fn single(bytes: &[u8]) -> [f64; 3] {
-    let at =
-        |k: usize| bytes.get(4 * k..4 * k + 4).and_then(|b| b.try_into().ok()).map_or(f32::NAN, f32::from_le_bytes);
-    [0, 1, 2].map(|k| f64::from(at(k)))
-}
-
-fn integer(bytes: &[u8], at: usize) -> Option<usize> {
-    let four = bytes.get(at..at + 4)?.try_into().ok()?;
-    usize::try_from(i32::from_le_bytes(four)).ok()
-}
-
-/// A binary STL file.
-fn stl(bytes: &[u8]) -> Result<Vec<Triangle>, String> {
-    let wrong = || "the STL file has another size than its header says; perhaps it is one of text".to_string();
-    let count = integer(bytes, 80).filter(|n| (1..=MOST).contains(n)).ok_or_else(wrong)?;
-    if bytes.len() != 84 + 50 * count {
-        return Err(wrong());
-    }
-    let corner = |face: &[u8], k: usize| single(&face[12 * (k + 1)..]);
-    Ok(bytes[84..].chunks_exact(50).map(|face| [0, 1, 2].map(|k| corner(face, k))).collect())
-}
-
-/// A file of MuJoCo's own format.
-fn msh(bytes: &[u8]) -> Result<Vec<Triangle>, String> {
-    let wrong = || "the MSH file has another size than its header says".to_string();
-    let counts = [0, 4, 8, 12].map(|at| integer(bytes, at).filter(|n| *n <= MOST));
-    let [Some(vertices), Some(normals), Some(textures), Some(faces)] = counts else { return Err(wrong()) };
-    let start = 16 + 12 * vertices + 12 * normals + 8 * textures;
-    if bytes.len() != start + 12 * faces {
-        return Err(wrong());
-    }
-    if faces == 0 {
-        return Err("a mesh without faces is not read".into());
-    }
-    let vertices: Vec<[f64; 3]> = bytes[16..16 + 12 * vertices].chunks_exact(12).map(single).collect();
-    let index = |face: &[u8], k: usize| integer(face, 4 * k).unwrap_or(usize::MAX);
-    corners(&vertices, bytes[start..].chunks_exact(12).map(|face| [0, 1, 2].map(|k| index(face, k))))
-}
-
-/// An OBJ file of triangles.
+/// The triangles of an OBJ file. MuJoCo keeps vertices in single precision.
 fn obj(bytes: &[u8]) -> Result<Vec<Triangle>, String> {
-    let text = std::str::from_utf8(bytes).map_err(|_| "the OBJ file is no text".to_string())?;
-    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
-    for (k, line) in text.lines().enumerate() {
-        let mut words = line.split_whitespace();
-        let wrong = || format!("line {} of the OBJ file is not read", k + 1);
-        match words.next() {
-            Some("v") => {
-                let all: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
-                let [x, y, z, ..] = all[..] else { return Err(wrong()) };
-                vertices.push([x, y, z].map(|x: f64| f64::from(x as f32)));
-            }
-            Some("f") => {
-                let index = |word: &str| {
-                    let k: i64 = word.split('/').next()?.parse().ok()?;
-                    let count = i64::try_from(vertices.len()).ok()?;
-                    usize::try_from(if k < 0 { count.checked_add(k)? } else { k - 1 }).ok()
-                };
-                let all: Option<Vec<usize>> = words.map(index).collect();
-                let Some(&[a, b, c]) = all.as_deref() else {
-                    return Err(format!("line {} of the OBJ file is no triangle", k + 1));
-                };
-                faces.push([a, b, c]);
-            }
-            _ => {}
-        }
+    let (obj, problems) = mesh::obj(bytes);
+    if let Some(problem) = problems.first() {
+        return Err(match problem.line {
+            0 => problem.message.clone(),
+            line => format!("line {line} of the OBJ file is not read"),
+        });
     }
+    let mut faces = Vec::new();
+    for (line, face) in obj.faces {
+        let face = <[usize; 3]>::try_from(face);
+        faces.push(face.map_err(|_| format!("line {line} of the OBJ file is no triangle"))?);
+    }
+    let vertices: Vec<[f64; 3]> = obj.vertices.iter().map(|v| v.map(|x| f64::from(x as f32))).collect();
     corners(&vertices, faces.into_iter())
 }
 

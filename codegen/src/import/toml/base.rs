@@ -4,10 +4,11 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::table::Table;
+use super::Named;
 use crate::import::raw::{RawBody, RawJoint, RawModel, RawMotion};
 use crate::import::source::{Findings, Span};
 use crate::import::words::quote;
-use crate::import::{mjcf, text, urdf, Base, ImportOptions, ReadFile, XmlFormat};
+use crate::import::{mjcf, text, urdf, Base, ImportOptions, XmlFormat};
 
 pub(super) const KEYS: &[&str] = &["file", "root", "limits"];
 
@@ -30,17 +31,13 @@ impl Known {
 }
 
 /// Reads the model that is changed. Its places stand behind those of the text that names it.
-pub(super) fn read(
-    table: &Table,
-    options: &ImportOptions,
-    findings: &mut Findings,
-    files: ReadFile,
-) -> Option<RawModel> {
+pub(super) fn read(table: &Table, options: &ImportOptions, findings: &mut Findings, named: &Named) -> Option<RawModel> {
+    let files = named.files;
     table.reject_unknown(KEYS, "a base", findings);
     let root = table.choice("root", &Base::ALL.map(Base::name), findings).map(|choice| Base::ALL[choice.value]);
     let limits = table.flag("limits", findings).is_some_and(|flag| flag.value);
     let name = table.required_text("file", findings)?;
-    let path = Path::new(findings.file()).parent().unwrap_or(Path::new("")).join(&name.value);
+    let path = named.folder.join(&name.value);
     let text = match text(files, &path) {
         Ok(text) => text,
         Err(error) => {
@@ -62,10 +59,12 @@ pub(super) fn read(
         Some("xml") if XmlFormat::of(&text) == Some(XmlFormat::Mjcf) => {
             mjcf::read(&placed(&text, findings), &options, findings, files)
         }
-        Some("urdf" | "xml") => urdf::read(&placed(&text, findings), &options, findings),
+        Some("urdf" | "xml") => urdf::read(&placed(&text, findings), &options, findings, (&path, files)),
         Some("toml") => {
             super::refuse_options(&options, findings);
-            super::document(&placed(&text, findings), &options, findings, None)
+            let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+            let named = Named { files, folder, is_base: true };
+            super::document(&placed(&text, findings), &options, findings, &named)
         }
         _ => {
             let help = "name a `.urdf`, `.xml` or `.toml` file";

@@ -2,17 +2,37 @@
 
 use mbd_runtime::contact::RestitutionLaw;
 
-use super::super::raw::{RawContact, RawModel, RawShape, RawSurface};
+use super::super::hull;
+use super::super::mesh::Problem;
+use super::super::raw::{RawContact, RawHull, RawModel, RawShape, RawSurface, RawValue};
 use super::super::source::{Findings, Spanned};
+use super::super::words::quote;
 use super::constraints::between;
 use super::entries::placement;
 use super::kinds::kind;
-use super::numbers::Unit;
+use super::numbers::{direction, Unit};
 use super::table::Table;
+use super::Named;
 use crate::model::SHAPES;
+use ::toml::de::DeValue;
 
-pub(super) const SHAPE: &[&str] =
-    &["name", "body", "type", "xyz", "rpy", "rotate", "radius", "length", "size", "semi_axes", "normal"];
+pub(super) const SHAPE: &[&str] = &[
+    "name",
+    "body",
+    "type",
+    "xyz",
+    "rpy",
+    "rotate",
+    "radius",
+    "length",
+    "size",
+    "semi_axes",
+    "normal",
+    "points",
+    "file",
+    "scale",
+    "most",
+];
 pub(super) const CONTACT: &[&str] = &["name", "between", "friction", "restitution", "law"];
 pub(super) const CONTACTS: &[&str] = &["pairs", "friction", "restitution", "law"];
 
@@ -21,9 +41,9 @@ pub(super) const LAWS: [(&str, RestitutionLaw); 3] =
     [("poisson", RestitutionLaw::Poisson), ("stronge", RestitutionLaw::Stronge), ("newton", RestitutionLaw::Newton)];
 
 /// Shapes and contacts.
-pub(super) fn all(top: &Table, raw: &mut RawModel, findings: &mut Findings) {
+pub(super) fn all(top: &Table, named: &Named, raw: &mut RawModel, findings: &mut Findings) {
     for table in top.tables("shape", findings) {
-        shape(&table, raw, findings);
+        shape(&table, named, raw, findings);
     }
     for table in top.tables("contact", findings) {
         contact(&table, raw, findings);
@@ -43,26 +63,131 @@ pub(super) fn surfaces(top: &Table, raw: &mut RawModel, findings: &mut Findings)
 /// What to do about shapes of other programs.
 fn special(lower: &str) -> Option<String> {
     let help = "describe it by a few spheres, capsules or points";
-    ["mesh", "hull", "hfield", "height_field"].contains(&lower).then(|| help.into())
+    ["hfield", "height_field", "heightfield"].contains(&lower).then(|| help.into())
 }
 
-fn shape(table: &Table, raw: &mut RawModel, findings: &mut Findings) {
+fn shape(table: &Table, named: &Named, raw: &mut RawModel, findings: &mut Findings) {
     table.reject_unknown(SHAPE, "a shape", findings);
     let name = table.required_text("name", findings);
+    let kind = kind(table, &SHAPES, |spec| &spec.words, special, findings);
+    let is_hull = kind.as_ref().is_some_and(|kind| kind.value.word() == "hull");
     let shape = RawShape {
         name: name.clone().unwrap_or(Spanned::new(String::new(), table.span)),
         body: table.text("body", findings),
-        kind: kind(table, &SHAPES, |spec| &spec.words, special, findings),
+        kind,
         placement: placement(table, findings),
         radius: table.number("radius", Unit::Plain, findings),
         length: table.number("length", Unit::Plain, findings),
         size: table.vec3("size", Unit::Plain, findings),
         semi_axes: table.vec3("semi_axes", Unit::Plain, findings),
         normal: table.direction("normal", findings),
+        hull: hull(table, is_hull, named, findings),
     };
     match name {
         Some(_) => raw.shapes.push(shape),
         None => raw.incomplete = true,
+    }
+}
+
+/// The entries of a hull, and its corners where the shape `is_hull`.
+fn hull(table: &Table, is_hull: bool, named: &Named, findings: &mut Findings) -> Option<RawHull> {
+    let keys = ["points", "file", "scale", "most"].into_iter().filter(|key| table.has(key));
+    let keys: Vec<_> = keys.map(|key| (key, table.key_span(key))).collect();
+    (!keys.is_empty()).then(|| {
+        let corners = if is_hull { corners(table, named, findings) } else { None };
+        RawHull { keys, corners }
+    })
+}
+
+/// The corners of a hull; `None` where something was reported, or it has neither points nor a file.
+fn corners(table: &Table, named: &Named, findings: &mut Findings) -> Option<Vec<[f64; 3]>> {
+    let most = most(table, findings);
+    let factor = scale(table, findings);
+    let (points, file) = (points(table, findings), table.text("file", findings));
+    let (points, source) = match (table.has("points"), table.has("file")) {
+        (true, true) => {
+            let message = format!("{}`points` and `file` together", table.prefix());
+            findings.error(table.key_span("file"), message, "keep one of them");
+            return None;
+        }
+        (true, false) if table.has("scale") => {
+            let message = format!("{}`scale` is that of a `file`", table.prefix());
+            findings.error(table.key_span("scale"), message, "remove it, and write the points in metres");
+            return None;
+        }
+        (true, false) => (points?, None),
+        (false, _) => {
+            let file = file?;
+            let path = named.folder.join(&file.value);
+            let bytes = (named.files)(&path).map_err(|error| Problem::whole(format!("it cannot be read: {error}")));
+            let factor = factor?;
+            match bytes.and_then(|bytes| hull::of_mesh(&path, &bytes, [factor; 3])) {
+                Ok(points) => (points, Some(file)),
+                Err(problems) => {
+                    hull::report(&problems, &path, &file, &table.prefix(), findings);
+                    return None;
+                }
+            }
+        }
+    };
+    let span = source.as_ref().map_or(table.get("points").map_or(table.span, |(span, _)| span), |file| file.span);
+    match hull::corners(&points, most?) {
+        Ok(found) => {
+            if let Some(told) = found.told(source.map(|file| quote(&file.value)).as_deref()) {
+                findings.notice(span, format!("{}{told}", table.prefix()));
+            }
+            if found.flat {
+                let [message, help] = hull::FLAT;
+                findings.warning(span, format!("{}{message}", table.prefix()), help);
+            }
+            Some(found.corners)
+        }
+        Err(problem) => {
+            let help = if points.is_empty() { "write at least one" } else { "leave points out, or raise `most`" };
+            findings.error(span, format!("{}{problem}", table.prefix()), help);
+            None
+        }
+    }
+}
+
+/// Points in the axes of the shape; `None` where something was reported.
+fn points(table: &Table, findings: &mut Findings) -> Option<Vec<[f64; 3]>> {
+    let value = table.raw("points")?;
+    let DeValue::Array(items) = value.get_ref() else {
+        table.wrong_type("points", "a list of points", "`points = [[x, y, z], ..]`, in metres", findings);
+        return None;
+    };
+    let one = |(k, item)| direction(item, &format!("{}point {}", table.prefix(), k + 1), findings);
+    let points: Vec<_> = items.iter().enumerate().map(one).collect();
+    points.into_iter().map(|point| Some(point?.value)).collect()
+}
+
+/// The most corners of a hull; `None` where something was reported.
+fn most(table: &Table, findings: &mut Findings) -> Option<usize> {
+    let (least, greatest, otherwise) = hull::MOST;
+    let Some(most) = table.number("most", Unit::Plain, findings) else { return Some(otherwise) };
+    match most.value {
+        RawValue::Const(x) if x.fract() == 0.0 && (least as f64..=greatest as f64).contains(&x) => Some(x as usize),
+        RawValue::Invalid => None,
+        _ => {
+            let message = format!("{}`most` is no whole number from {least} to {greatest}", table.prefix());
+            findings.error(most.span, message, "write how many corners the hull may have; every one is a contact");
+            None
+        }
+    }
+}
+
+/// The factor from the unit of a mesh to metres; `None` where something was reported.
+fn scale(table: &Table, findings: &mut Findings) -> Option<f64> {
+    let Some(scale) = table.number("scale", Unit::Plain, findings) else { return Some(1.0) };
+    match scale.value {
+        RawValue::Const(x) if x > 0.0 => Some(x),
+        RawValue::Invalid => None,
+        _ => {
+            let message = format!("{}`scale` is no constant greater than 0", table.prefix());
+            findings.error(scale.span, message, "write the length of the unit of the mesh in metres: 0.001 for mm");
+            None
+        }
     }
 }
 

@@ -11,6 +11,8 @@ mod table;
 mod variants;
 mod write;
 
+use std::path::{Path, PathBuf};
+
 use ::toml::de::{DeTable, DeValue, Error};
 
 use self::base::Known;
@@ -30,11 +32,21 @@ const KEYS: &[&str] = &[
 /// Reads a model without checking the mechanism; `None` where the text is no TOML, or the `[base]` that it names cannot be
 /// read. Without one, the options have to be the defaults; gravity replaces that of the file.
 pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings, files: ReadFile) -> Option<RawModel> {
-    let mut raw = document(text, options, findings, Some(files))?;
+    let folder = Path::new(findings.file()).parent().unwrap_or(Path::new("")).to_path_buf();
+    let mut raw = document(text, options, findings, &Named { files, folder, is_base: false })?;
     if let Some(g) = options.gravity {
         raw.gravity = Some(override_gravity(g, findings));
     }
     Some(raw)
+}
+
+/// The files that a text names.
+struct Named<'f> {
+    files: ReadFile<'f>,
+    /// Where their paths start.
+    folder: PathBuf,
+    /// Whether the text is a base, which has none itself.
+    is_base: bool,
 }
 
 /// Reports options that a model without `[base]` states itself.
@@ -56,8 +68,8 @@ fn override_gravity(g: [f64; 3], findings: &mut Findings) -> RawGravity {
     RawGravity::of_options(g)
 }
 
-/// Reads a text, and with `files` the one that it names as its base.
-fn document(text: &str, options: &ImportOptions, findings: &mut Findings, files: Option<ReadFile>) -> Option<RawModel> {
+/// Reads a text, and the files that it names.
+fn document(text: &str, options: &ImportOptions, findings: &mut Findings, named: &Named) -> Option<RawModel> {
     let document = match DeTable::parse(text) {
         Ok(document) => document,
         Err(error) => {
@@ -67,16 +79,16 @@ fn document(text: &str, options: &ImportOptions, findings: &mut Findings, files:
     };
     let top = Table::new(document.get_ref(), Span::FILE, String::new());
     top.reject_unknown(KEYS, "a model", findings);
-    let mut raw = match (top.table("base", findings), files) {
-        (Some(table), Some(files)) => base::read(&table, options, findings, files)?,
-        (Some(table), None) => {
+    let mut raw = match (top.table("base", findings), named.is_base) {
+        (Some(table), false) => base::read(&table, options, findings, named)?,
+        (Some(table), true) => {
             let help =
                 "name the file that it changes as the base, or convert it: `mbd convert FILE.toml -o WHOLE.toml`";
             findings.error(table.span, "the base of a model has a `[base]` itself", help);
             return None;
         }
-        (None, None) => RawModel::empty(),
-        (None, Some(_)) => {
+        (None, true) => RawModel::empty(),
+        (None, false) => {
             refuse_options(options, findings);
             RawModel::empty()
         }
@@ -91,15 +103,22 @@ fn document(text: &str, options: &ImportOptions, findings: &mut Findings, files:
     if let Some(table) = top.table("params", findings) {
         params(&table, &mut raw, findings);
     }
-    parts(&top, &[], &mut known, &mut raw, findings);
+    parts(&top, named, &[], &mut known, &mut raw, findings);
     contacts::surfaces(&top, &mut raw, findings);
-    variants::all(&top, &mut raw, findings);
+    variants::all(&top, named, &mut raw, findings);
     Some(raw)
 }
 
 /// All that stands in lists: bodies, joints and what refers to them. `joints` are known besides those in the table, and
 /// what is `known` of the model is changed.
-fn parts(top: &Table, joints: &[RawJoint], known: &mut Known, raw: &mut RawModel, findings: &mut Findings) {
+fn parts(
+    top: &Table,
+    named: &Named,
+    joints: &[RawJoint],
+    known: &mut Known,
+    raw: &mut RawModel,
+    findings: &mut Findings,
+) {
     for table in top.tables("body", findings) {
         entries::body(table, known, raw, findings);
     }
@@ -113,7 +132,7 @@ fn parts(top: &Table, joints: &[RawJoint], known: &mut Known, raw: &mut RawModel
         entries::wrench(table, raw, findings);
     }
     constraints::all(top, joints, raw, findings);
-    contacts::all(top, raw, findings);
+    contacts::all(top, named, raw, findings);
 }
 
 fn gravity(top: &Table, span: Span, value: &DeValue, findings: &mut Findings) -> Option<RawGravity> {

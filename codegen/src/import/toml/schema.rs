@@ -2,7 +2,7 @@
 //! it cannot differ from it in them.
 
 use super::{base, constraints, contacts, entries, variants, KEYS};
-use crate::import::Base;
+use crate::import::{hull, Base};
 use crate::model::{Words, JOINTS, LOOPS, SHAPES};
 
 /// The definitions that the tables share.
@@ -21,6 +21,7 @@ const DEFINITIONS: &[(&str, &str)] = &[
     ),
     ("vector", r##"{ "type": "array", "items": { "$ref": "#/definitions/number" }, "minItems": 3, "maxItems": 3 }"##),
     ("direction", r#"{ "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 }"#),
+    ("points", r##"{ "type": "array", "items": { "$ref": "#/definitions/direction" }, "minItems": 1 }"##),
     ("numbers", r##"{ "type": "array", "items": { "$ref": "#/definitions/number" } }"##),
     ("freedoms", r##"{ "anyOf": [{ "$ref": "#/definitions/angle" }, { "$ref": "#/definitions/angles" }] }"##),
     ("name", r#"{ "type": "string", "minLength": 1 }"#),
@@ -124,6 +125,11 @@ fn property(table: &str, key: &str) -> String {
         ) => {
             format!("{{ \"type\": \"array\", \"items\": {} }}", reference(key))
         }
+        (_, "points") => reference("points"),
+        (_, "most") => {
+            format!("{{ \"type\": \"integer\", \"minimum\": {}, \"maximum\": {} }}", hull::MOST.0, hull::MOST.1)
+        }
+        (_, "scale") => r#"{ "type": "number", "exclusiveMinimum": true, "minimum": 0 }"#.into(),
         (_, "name" | "parent" | "child" | "body" | "file") => reference("name"),
         (_, "between") => reference("between"),
         (_, "joints" | "remove" | "cut" | "lock") => reference("names"),

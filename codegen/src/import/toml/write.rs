@@ -5,6 +5,7 @@ use std::fmt::Display;
 
 use super::contacts::LAWS;
 use super::entries::INERTIA;
+use crate::import::hull;
 use crate::import::raw::{
     RawBody, RawConstraint, RawContact, RawCoupling, RawFrame, RawFreedoms, RawGravity, RawJoint, RawLimits, RawLoop,
     RawMimic, RawModel, RawMotion, RawNumber, RawPlacement, RawRotation, RawShape, RawSurface, RawValue, RawVariant,
@@ -274,6 +275,10 @@ impl Text {
         self.maybe("size", shape.size.as_ref().map(|size| list(&size.value)));
         self.maybe("semi_axes", shape.semi_axes.as_ref().map(|axes| list(&axes.value)));
         self.maybe("normal", shape.normal.as_ref().map(direction));
+        if let Some(corners) = shape.hull.as_ref().and_then(|hull| hull.corners.as_ref()) {
+            self.entry("points", bracketed(corners.iter().map(|c| bracketed(c.iter().map(|x| constant(*x))))));
+            self.maybe("most", (corners.len() > hull::MOST.2).then_some(corners.len()));
+        }
     }
 
     fn contact(&mut self, contact: &RawContact) {

@@ -7,21 +7,24 @@
 
 mod joint;
 mod link;
+mod mesh;
 mod shape;
 
 #[cfg(test)]
 mod tests;
 
+use self::mesh::Meshes;
 use super::raw::{RawBody, RawGravity, RawJoint, RawModel};
 use super::source::{Findings, Spanned};
 use super::taken::Taken;
 use super::tally::Tally;
 use super::words::{list, quote};
 use super::xml::{place, shown, syntax_error, without_late_declaration, Reader};
-use super::{floor, Base, ImportOptions};
+use super::{floor, Base, ImportOptions, ReadFile};
 use crate::model::{FIXED, FLOATING, PLANAR};
 use roxmltree::{Document, Node};
 use std::collections::HashSet;
+use std::path::Path;
 
 /// Elements of a `robot` that have no effect on its motion.
 const IGNORED: [(&str, &str); 6] = [
@@ -37,8 +40,14 @@ const IGNORED: [(&str, &str); 6] = [
 ///
 /// The joint `root_joint`, of the kind in `options.base`, connects the root link to the ground. Links stay bodies and
 /// fixed joints stay joints. A link called `ground`, a name this project keeps for the fixed world, becomes
-/// `ground_link`.
-pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings) -> Option<RawModel> {
+/// `ground_link`. Where the options ask for a floor, the meshes that the text names are read by `files`, from places beside
+/// `path`.
+pub fn read(
+    text: &str,
+    options: &ImportOptions,
+    findings: &mut Findings,
+    (path, files): (&Path, ReadFile),
+) -> Option<RawModel> {
     let text = &*without_late_declaration(text, findings);
     let document = match Document::parse(text) {
         Ok(document) => document,
@@ -49,13 +58,19 @@ pub fn read(text: &str, options: &ImportOptions, findings: &mut Findings) -> Opt
         }
     };
     let mut reader = Reader { findings, tally: Tally::default() };
-    let raw = read_robot(&mut reader, document.root_element(), options);
+    let meshes = options.floor.map(|_| Meshes::new(path, files));
+    let raw = read_robot(&mut reader, document.root_element(), options, meshes);
     let Reader { findings, tally } = reader;
     tally.report(findings);
     raw
 }
 
-fn read_robot(reader: &mut Reader, node: Node, options: &ImportOptions) -> Option<RawModel> {
+fn read_robot(
+    reader: &mut Reader,
+    node: Node,
+    options: &ImportOptions,
+    mut meshes: Option<Meshes>,
+) -> Option<RawModel> {
     if node.tag_name().name() != "robot" {
         let help = match node.tag_name().name() {
             "mujoco" => "a MuJoCo model is read from a file that ends in `.xml` or `.mjcf`",
@@ -83,12 +98,15 @@ fn read_robot(reader: &mut Reader, node: Node, options: &ImportOptions) -> Optio
         if child.tag_name().name() == "link" {
             let body = link::read(reader, child);
             if let Some(body) = &body {
-                shape::all(reader, child, &body.name, options.floor.is_some(), &mut taken, &mut raw.shapes);
+                shape::all(reader, child, &body.name, &mut meshes, &mut taken, &mut raw.shapes);
             }
             push_or_note(&mut raw.bodies, body, &mut raw.incomplete);
         } else {
             push_or_note(&mut raw.joints, joint::read(reader, child, options.limits), &mut raw.incomplete);
         }
+    }
+    if let Some(meshes) = meshes {
+        meshes.tell(reader);
     }
     if raw.bodies.is_empty() && !raw.incomplete {
         reader.findings.error(place(node), "a robot without links", "give at least one `link`");

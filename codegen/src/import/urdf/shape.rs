@@ -2,10 +2,11 @@
 //!
 //! Most readers of a robot want no contacts. What is wrong with a shape is therefore a warning, and the shape left out.
 
+use super::mesh::{self, Meshes};
 use crate::diag::Severity;
-use crate::import::raw::{RawNumber, RawPlacement, RawRotation, RawShape, RawValue, RawVec3};
+use crate::import::raw::{RawHull, RawNumber, RawPlacement, RawRotation, RawShape, RawValue, RawVec3};
 use crate::import::source::{Span, Spanned};
-use crate::import::taken::Taken;
+use crate::import::taken::{Taken, CORNERS};
 use crate::import::tally::Tally;
 use crate::import::words::quote;
 use crate::import::xml::{is_own, place, Reader};
@@ -13,26 +14,25 @@ use crate::model::{ShapeSpec, SHAPES};
 use roxmltree::Node;
 
 const IDLE: &str = "a `collision` touches nothing unless a floor is asked for (`--floor` of `mbd simulate`)";
-const MESH: &str = "`mesh` of a `collision` is not used: only box, sphere, cylinder and capsule are read";
 
-/// Reads the shapes of a link. Without a floor they are said to touch nothing.
+/// Reads the shapes of a link. Without a floor, there are no `meshes`, and shapes are said to touch nothing.
 pub(super) fn all(
     reader: &mut Reader,
     link: Node,
     body: &Spanned<String>,
-    floor: bool,
+    meshes: &mut Option<Meshes>,
     taken: &mut Taken,
     shapes: &mut Vec<RawShape>,
 ) {
     for node in elements(link).filter(|n| n.tag_name().name() == "collision") {
-        match shape(reader, node, body, taken) {
+        match shape(reader, node, body, meshes.as_mut(), taken) {
             Ok(shape) => {
                 shapes.push(shape);
-                if !floor {
+                if meshes.is_none() {
                     reader.tally.notice(place(node), IDLE);
                 }
             }
-            Err(Unread::Mesh(at)) => reader.tally.notice(at, MESH),
+            Err(Unread::Mesh(at, why)) => reader.tally.notice(at, why),
             Err(Unread::Faulty(at, what)) => faulty(&mut reader.tally, at, &what),
         }
     }
@@ -47,28 +47,39 @@ fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
 }
 
 /// Why a shape was left out.
-enum Unread {
-    Mesh(Span),
+pub(super) enum Unread {
+    /// A mesh, and what is said about all such.
+    Mesh(Span, &'static str),
     Faulty(Span, String),
 }
 
 fn faulty(tally: &mut Tally, at: Span, what: &str) {
     let message = format!("a `collision` is not used: {what}");
-    let help = "write one box, sphere, cylinder or capsule with lengths in metres, greater than 0; or remove it";
+    let help = "write one box, sphere, cylinder, capsule or mesh with lengths in metres, greater than 0; or remove it";
     tally.add(Severity::Warning, "collision", at, message, help);
 }
 
-fn shape(reader: &Reader, node: Node, body: &Spanned<String>, taken: &mut Taken) -> Result<RawShape, Unread> {
+fn shape(
+    reader: &Reader,
+    node: Node,
+    body: &Spanned<String>,
+    meshes: Option<&mut Meshes>,
+    taken: &mut Taken,
+) -> Result<RawShape, Unread> {
     let geometry = child(node, "geometry").ok_or_else(|| Unread::Faulty(place(node), "it has no `geometry`".into()))?;
     let solid = elements(geometry).next().ok_or_else(|| Unread::Faulty(place(geometry), "it has no shape".into()))?;
     let word = solid.tag_name().name();
-    if word == "mesh" {
-        return Err(Unread::Mesh(place(solid)));
-    }
-    let Some(spec) =
-        SHAPES.iter().find(|spec| spec.word() == word && ["box", "sphere", "cylinder", "capsule"].contains(&word))
+    let own = if word == "mesh" { "hull" } else { word };
+    let Some(spec) = SHAPES
+        .iter()
+        .find(|spec| spec.word() == own && ["box", "sphere", "cylinder", "capsule", "mesh"].contains(&word))
     else {
         return Err(Unread::Faulty(place(solid), format!("{} is no shape", quote(word))));
+    };
+    let hull = match (word, meshes) {
+        ("mesh", None) => return Err(Unread::Mesh(place(solid), mesh::IDLE)),
+        ("mesh", Some(meshes)) => Some(meshes.hull(reader, solid)?),
+        _ => None,
     };
     let key = |key: &str| spec.keys.contains(&key);
     let radius = key("radius").then(|| length(reader, solid, "radius")).transpose()?;
@@ -82,22 +93,19 @@ fn shape(reader: &Reader, node: Node, body: &Spanned<String>, taken: &mut Taken)
         },
     };
     let given = reader.attribute(node, "name").map(|n| n.value.trim()).filter(|n| !n.is_empty());
-    let name = taken.shape(given.unwrap_or(&body.value));
-    Ok(RawShape {
-        name: Spanned::new(name, place(node)),
-        body: Some(body.clone()),
-        kind: Some(Spanned::new(spec as &'static ShapeSpec, place(solid))),
-        placement,
-        radius,
-        length,
-        size,
-        semi_axes: None,
-        normal: None,
-    })
+    let contacts = hull.as_ref().map_or(CORNERS, Vec::len);
+    let name = Spanned::new(taken.shape(given.unwrap_or(&body.value), contacts), place(node));
+    let hull = hull.map(|corners| RawHull { keys: vec![("file", place(solid))], corners: Some(corners) });
+    let kind = Some(Spanned::new(spec as &'static ShapeSpec, place(solid)));
+    Ok(RawShape { body: Some(body.clone()), placement, radius, length, size, hull, ..RawShape::new(name, kind) })
 }
 
 /// Finite numbers under a key; `None` where there is no such attribute.
-fn numbers<const N: usize>(reader: &Reader, node: Node, key: &str) -> Result<Option<Spanned<[f64; N]>>, Unread> {
+pub(super) fn numbers<const N: usize>(
+    reader: &Reader,
+    node: Node,
+    key: &str,
+) -> Result<Option<Spanned<[f64; N]>>, Unread> {
     let Some(text) = reader.attribute(node, key) else { return Ok(None) };
     let all: Vec<f64> = text.value.split_whitespace().map_while(|word| word.parse().ok()).collect();
     match <[f64; N]>::try_from(all) {

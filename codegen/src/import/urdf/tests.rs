@@ -250,7 +250,8 @@ fn shapes_are_read_and_touch_a_floor_that_is_asked_for() {
     assert_eq!(free.shapes[1].mount.placement.rotation, Rotation::Rpy([0.1, 0.2, 0.3].map(Value::Const)));
     assert_eq!(free.shapes[2].kind, ShapeKind::Cylinder { radius: 0.1, length: 0.4 });
     // The link `ground` is called otherwise here; its shape stays on it.
-    assert_eq!((free.shapes[3].kind, free.shapes[3].mount.body), (ShapeKind::Capsule { radius, length }, Some(1)));
+    let capsule = &free.shapes[3];
+    assert_eq!((&capsule.kind, capsule.mount.body), (&ShapeKind::Capsule { radius, length }, Some(1)));
     assert!(free.contacts.is_empty());
     assert!(findings.contains("touches nothing unless a floor is asked for"), "{findings}");
     assert!(findings.contains("`mesh` of a `collision` is not used"), "{findings}");

@@ -4,6 +4,7 @@ use super::watch::TURN;
 use super::Hybrid;
 use crate::contact::{Mode, Reach, Touching, WithContacts};
 use crate::integrate::Stepper;
+use crate::lists::get;
 use crate::system::Real;
 use crate::Scalar;
 
@@ -85,14 +86,21 @@ fn travels<S: Real>(reaches: &[Reach<S>], moved: &[S], size: &[S], out: &mut [S]
     let zero = S::zero();
     // Where nothing is known, everything may have happened.
     out.fill(S::constant(f64::INFINITY));
-    for (out, row) in out.iter_mut().zip(reaches.chunks(moved.len().max(1))) {
-        let (mut way, mut angle, mut arm) = (zero, zero, zero);
-        for (reach, (moved, size)) in row.iter().zip(moved.iter().zip(size)) {
-            way = way + reach.rate * *moved;
-            angle = angle + reach.turn * *moved;
-            arm = arm + reach.slide * (*size + *moved);
+    let mut contact = usize::MAX;
+    let (mut way, mut angle, mut arm) = (zero, zero, zero);
+    for reach in reaches {
+        if reach.contact != contact {
+            contact = reach.contact;
+            (way, angle, arm) = (zero, zero, zero);
         }
-        *out = way + angle * arm;
+        let (moved, size) = (get(moved, reach.velocity), get(size, reach.velocity));
+        way = way + reach.rate * moved;
+        angle = angle + reach.turn * moved;
+        arm = arm + reach.slide * (size + moved);
+        // The last entry of a contact has the whole sum.
+        if let Some(out) = out.get_mut(contact) {
+            *out = way + angle * arm;
+        }
     }
 }
 
@@ -101,7 +109,9 @@ impl<Y: Touching> WithContacts<Y> {
     /// [`WithContacts::look`].
     pub(super) fn turning(&self, k: usize) -> Y::Scalar {
         let v = self.at.v.as_ref();
-        let row = self.system().reaches().get(k * v.len()..).unwrap_or(&[]);
-        row.iter().zip(v).fold(Y::Scalar::zero(), |sum, (reach, v)| sum + reach.turn * v.abs())
+        let reaches = self.system().reaches();
+        let row = reaches.iter().skip(reaches.partition_point(|reach| reach.contact < k));
+        let row = row.take_while(|reach| reach.contact == k);
+        row.fold(Y::Scalar::zero(), |sum, reach| sum + reach.turn * get(v, reach.velocity).abs())
     }
 }
