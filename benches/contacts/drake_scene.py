@@ -1,15 +1,20 @@
-"""Builds a model of this project as a plant of Drake: the numbers are those of the file which `mjcf.py` also reads.
+"""Builds a model of this project as a plant of Drake: the numbers are those of the file which `mjcf.py` reads.
 
-Bodies, joints, springs, dampers, limits and shapes become those of a MultibodyPlant; its reader of MJCF knows neither pairs nor
-bodies with several joints well enough to be used. Point contact has one point for each pair of shapes: a box is therefore its
-eight corners, as its documents advise and as this project has it. Every pair of shapes that the model names may touch; nothing
-else does.
+Bodies, joints, springs, dampers, limits and shapes become those of a MultibodyPlant. Drake's point contact has one point for
+each pair of shapes: a box is therefore its eight corners, as its documents advise and as this project has it. Every pair of
+shapes that the model names may touch; nothing else does.
 """
 
 import dataclasses
 import itertools
+import logging
 import math
+import os
+import pickle
+import select
+import signal
 import time
+from importlib.metadata import version
 
 import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
@@ -32,8 +37,12 @@ from pydrake.systems.framework import DiagramBuilder
 
 from mjcf import number, numbers, quaternion, towards, turned
 
-# Longest step of integrators with error control, s: Drake's own default.
-LONGEST = 0.1
+VERSION = version("drake")
+ACCURACIES = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8]
+# Seconds after which a run is stopped: some integrators do not come back.
+LIMIT = 15.0
+# Half spaces do not work with deformable bodies, joint limits not with continuous plants: both are known.
+logging.getLogger("drake").setLevel(logging.ERROR)
 
 
 @dataclasses.dataclass
@@ -45,6 +54,8 @@ class Setting:
     approximation: str = "lagged"
     integrator: str = ""
     accuracy: float = 1e-3
+    # Drake's own longest step of integrators with error control, s.
+    longest: float = 0.1
     # Of a pair, N/m, s/m, s.
     stiffness: float | None = None
     dissipation: float | None = None
@@ -164,12 +175,15 @@ class Scene:
         else:
             parts = [(frame, Sphere(shape.get("radius", 0)))]
         properties = ProximityProperties()
-        add = lambda key, value: value is None or properties.AddProperty("material", key, value)
-        add("coulomb_friction", CoulombFriction(friction, friction))
+        properties.AddProperty("material", "coulomb_friction", CoulombFriction(friction, friction))
         # Two springs in a row have half the stiffness; relaxation times add up.
-        add("point_contact_stiffness", self.setting.stiffness and 2 * self.setting.stiffness)
-        add("hunt_crossley_dissipation", self.setting.dissipation)
-        add("relaxation_time", None if self.setting.relaxation is None else 0.5 * self.setting.relaxation)
+        for key, value, share in (
+            ("point_contact_stiffness", self.setting.stiffness, 2.0),
+            ("hunt_crossley_dissipation", self.setting.dissipation, 1.0),
+            ("relaxation_time", self.setting.relaxation, 0.5),
+        ):
+            if value is not None:
+                properties.AddProperty("material", key, share * value)
         return [
             self.plant.RegisterCollisionGeometry(body, at, part, f"{shape['name']}_{k}", properties)
             for k, (at, part) in enumerate(parts)
@@ -182,12 +196,12 @@ class Scene:
         for start in self.starts:
             start(context)
         if self.setting.integrator:
-            ResetIntegratorFromFlags(simulator, self.setting.integrator, LONGEST)
+            ResetIntegratorFromFlags(simulator, self.setting.integrator, self.setting.longest)
             simulator.get_mutable_integrator().set_target_accuracy(self.setting.accuracy)
         simulator.Initialize()
         return simulator
 
-    def run(self, end, rounds, patience):
+    def timed(self, end, rounds, patience):
         """Seconds, and places of the bodies in the order of the file."""
         least = math.inf
         for _ in range(rounds):
@@ -199,6 +213,18 @@ class Scene:
                 break
         return least, self.places(simulator)
 
+    def gap(self, simulator):
+        """The least distance of shapes that may touch, m."""
+        port, context = self.plant.get_geometry_query_input_port(), self.plant.GetMyContextFromRoot(simulator.get_context())
+        pairs = port.Eval(context).ComputeSignedDistancePairwiseClosestPoints(1.0)
+        return min(pair.distance for pair in pairs)
+
+    def start(self):
+        """Mass, kg, kinetic and potential energy, J, at the start."""
+        context = self.plant.GetMyContextFromRoot(self.simulator().get_context())
+        energies = self.plant.EvalKineticEnergy(context), self.plant.EvalPotentialEnergy(context)
+        return [self.plant.CalcTotalMass(context), *energies]
+
     def places(self, simulator):
         context = self.plant.GetMyContextFromRoot(simulator.get_context())
         places = []
@@ -206,3 +232,123 @@ class Scene:
             frame = self.plant.GetBodyByName(body["name"]).EvalPoseInWorld(context)
             places += [frame.translation(), frame @ np.asarray(body.get("com", [0, 0, 0]), float)]
         return places
+
+
+def within(limit, function):
+    """What the function returns in a process of its own; `None` where it takes longer, or Drake gives up."""
+    source, sink = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(source)
+        try:
+            answer = pickle.dumps(function())
+            with os.fdopen(sink, "wb") as file:
+                file.write(answer)
+        except RuntimeError:
+            pass
+        finally:
+            os._exit(0)
+    os.close(sink)
+    with os.fdopen(source, "rb") as file:
+        if not select.select([file], [], [], limit)[0]:
+            os.kill(child, signal.SIGKILL)
+        answer = file.read()
+    os.waitpid(child, 0)
+    return pickle.loads(answer) if answer else None
+
+
+def dissipation(e, speed):
+    """Of Hunt and Crossley's law, s/m, for a restitution of `e` at this speed, m/s, by bisection.
+
+    With the force k x (1 + d v), v dv / (1 + d v) is integrated from the speed of approach to that of departure.
+    """
+    low, high = 0.0, 1.0 / e
+    for _ in range(60):
+        u = 0.5 * (low + high)
+        # What the compression takes less what the expansion gives.
+        left = (u - math.log1p(u)) + (e * u + math.log1p(-e * u))
+        low, high = (u, high) if left > 0 else (low, u)
+    return low / speed
+
+
+def settings(scene, steps, restitution):
+    """Settings by name, each with the name of what is varied and the `Setting` of each value.
+
+    `restitution` is that of the ball: its coefficient, the damping ratio and mass of a spring that has it, and the speed of
+    the first impact.
+    """
+
+    def discrete(approximation, of_step=lambda step: {}):
+        return "step", {step: Setting(step=step, approximation=approximation, **of_step(step)) for step in steps}
+
+    def continuous(integrator, **more):
+        return "accuracy", {a: Setting(integrator=integrator, accuracy=a, **more) for a in ACCURACIES}
+
+    if scene == "ball":
+        e, ratio, mass, speed = restitution
+
+        def spring(count):
+            def of_step(step):
+                frequency = math.pi / (count * step)
+                stiffness, relaxation = mass * frequency * frequency, 2 * ratio / frequency
+                return {"stiffness": stiffness, "relaxation": relaxation, "near_rigid": 0.0}
+
+            return of_step
+
+        bounce = {f"SAP, spring, bounce of {n} steps": discrete("sap", spring(n)) for n in (10, 40, 160)}
+        damping = dissipation(e, speed)
+        for name, integrator in (("runge_kutta3", "runge_kutta3"), ("radau3", "radau3"), ("CENIC", "cenic")):
+            for level, stiffness in (("hard", 1e6), ("harder", 1e8)):
+                bounce[f"{name}, {level}"] = continuous(integrator, stiffness=stiffness, dissipation=damping)
+        return bounce
+    levels = {
+        "": {},
+        ", hard": {"stiffness": 1e6, "dissipation": 500.0, "stiction": 1e-5},
+        ", harder": {"stiffness": 1e8, "dissipation": 5000.0, "stiction": 1e-7},
+    }
+    made = {
+        "SAP": discrete("sap"),
+        # Its own bound of the stiffness, and the relaxation that goes with it.
+        "SAP, rigid": discrete("sap", lambda step: {"stiffness": 1e12, "relaxation": step / math.pi}),
+        "lagged": discrete("lagged"),
+    }
+    for name, values in levels.items():
+        made[f"similar{name}"] = discrete("similar", lambda step, values=values: values)
+        made[f"TAMSI{name}"] = discrete("tamsi", lambda step, values=values: values)
+        made[f"CENIC{name}"] = continuous("cenic", **values)
+        # Continuous plants have no limits of joints but with CENIC, and the dropped quadruped comes to the stops of its knees.
+        if scene != "dropped":
+            made[f"radau3{name}"] = continuous("radau3", **values)
+            if name != ", harder":
+                made[f"implicit_euler{name}"] = continuous("implicit_euler", **values)
+                made[f"runge_kutta3{name}"] = continuous("runge_kutta3", **values)
+    return made
+
+
+def run(source, setting, end, rounds, patience):
+    """Seconds, and places of the bodies; `None` where there is no answer."""
+    return within(LIMIT, lambda: Scene(source, setting).timed(end, rounds, patience))
+
+
+def check(source, free, start, first, end, places):
+    """Compares the model with ours: mass and energies at the start, a motion without contacts, and the shapes.
+
+    `free` is the model without contacts, whose bodies we have at `places` at `end`; `start` are our mass and energies, and
+    `first` the time of our first event. Returns the largest differences.
+    """
+    # Of fifth order: errors of both programs are far below the bounds, and wrong numbers of a model far above.
+    # With a longer first step, it does not come back from the quadruped with stiff springs.
+    exact = Setting(integrator="runge_kutta5", accuracy=1e-11, longest=0.01)
+    scene = Scene(free, exact, contacts=False)
+    energy = max(abs(a - b) for a, b in zip(scene.start(), start))
+    simulator = scene.simulator()
+    simulator.AdvanceTo(end)
+    motion = float(np.max(np.abs(np.asarray(scene.places(simulator)) - np.asarray(places))))
+    # Shapes touch at the start or at the first event: nothing pushes before.
+    scene = Scene(source, exact)
+    simulator = scene.simulator()
+    gap = scene.gap(simulator)
+    if abs(gap) > 1e-9:
+        simulator.AdvanceTo(first)
+        gap = scene.gap(simulator)
+    return {"mass and energies": energy, "motion without contacts": motion, "distance at the first contact": abs(gap)}
