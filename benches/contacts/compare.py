@@ -34,6 +34,8 @@ STEPS = [4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5]
 ROUNDS = 3
 # A run of a rival that takes longer than this is its last one with these settings, s.
 PATIENCE = 3.0
+# Seconds after which Drake is stopped: some of its integrators do not come back.
+LIMIT = 15.0
 # Without contacts, all programs are exact to rounding and to what their integrators leave over in this time, s: far below this
 # bound, m or J. A wrong number of a model is far above. MuJoCo's least moments of inertia are within it.
 FREE, BOUND = 0.3, 1e-8
@@ -223,7 +225,7 @@ def compare(name, ours, work):
         speed = math.sqrt(2 * GRAVITY * HEIGHT)
         ball = RESTITUTION, damping_ratio(RESTITUTION), scene.model["body"][0]["mass"], speed
         settings = drake_scene.settings(name, STEPS, ball)
-        rivals["Drake"] = series(lambda how: measured(drake_scene.run(scene, how, end, ROUNDS, PATIENCE)), settings)
+        rivals["Drake"] = series(lambda how: measured(drake_scene.run(scene, how, end, ROUNDS, PATIENCE, LIMIT)), settings)
     return {"name": name, "title": title, "end": end, "known": known is not None, "ours": mine, "rivals": rivals}
 
 
@@ -236,7 +238,7 @@ def main():
         results.append(compare(name, ours, work))
         print(f"{name}: done", flush=True)
     versions = {"MuJoCo": mujoco.__version__} | ({"Drake": drake_scene.VERSION} if drake_scene else {})
-    result = {"versions": versions, "scenes": results}
+    result = {"versions": versions, "limit": LIMIT, "scenes": results}
     (work / "result.json").write_text(json.dumps(result, indent=1) + "\n")
     report.write(result, work)
 

@@ -13,7 +13,9 @@ import os
 import pickle
 import select
 import signal
+import sys
 import time
+import traceback
 from importlib.metadata import version
 
 import numpy as np
@@ -39,8 +41,6 @@ from mjcf import number, numbers, quaternion, towards, turned
 
 VERSION = version("drake")
 ACCURACIES = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8]
-# Seconds after which a run is stopped: some integrators do not come back.
-LIMIT = 15.0
 # Half spaces do not work with deformable bodies, joint limits not with continuous plants: both are known.
 logging.getLogger("drake").setLevel(logging.ERROR)
 
@@ -240,20 +240,25 @@ def within(limit, function):
     child = os.fork()
     if child == 0:
         os.close(source)
+        code = 1
         try:
-            answer = pickle.dumps(function())
             with os.fdopen(sink, "wb") as file:
-                file.write(answer)
-        except RuntimeError:
-            pass
+                file.write(pickle.dumps(function()))
+            code = 0
+        except RuntimeError as failure:
+            print(f"Drake gives up: {str(failure).splitlines()[0][:200]}", file=sys.stderr, flush=True)
+            code = 0
+        except BaseException:
+            traceback.print_exc()
         finally:
-            os._exit(0)
+            os._exit(code)
     os.close(sink)
     with os.fdopen(source, "rb") as file:
         if not select.select([file], [], [], limit)[0]:
             os.kill(child, signal.SIGKILL)
         answer = file.read()
-    os.waitpid(child, 0)
+    if os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) > 0:
+        raise ChildProcessError("a run of Drake failed")
     return pickle.loads(answer) if answer else None
 
 
@@ -290,12 +295,13 @@ def settings(scene, steps, restitution):
         def spring(count):
             def of_step(step):
                 frequency = math.pi / (count * step)
-                stiffness, relaxation = mass * frequency * frequency, 2 * ratio / frequency
-                return {"stiffness": stiffness, "relaxation": relaxation, "near_rigid": 0.0}
+                # An implicit step damps a spring as one more step of relaxation does.
+                relaxation = max(2 * ratio / frequency - step, 0.0)
+                return {"stiffness": mass * frequency * frequency, "relaxation": relaxation, "near_rigid": 0.0}
 
             return of_step
 
-        bounce = {f"SAP, spring, bounce of {n} steps": discrete("sap", spring(n)) for n in (10, 40, 160)}
+        bounce = {f"SAP, spring, bounce of {n} steps": discrete("sap", spring(n)) for n in (40, 160, 640)}
         damping = dissipation(e, speed)
         for name, integrator in (("runge_kutta3", "runge_kutta3"), ("radau3", "radau3"), ("CENIC", "cenic")):
             for level, stiffness in (("hard", 1e6), ("harder", 1e8)):
@@ -325,9 +331,10 @@ def settings(scene, steps, restitution):
     return made
 
 
-def run(source, setting, end, rounds, patience):
-    """Seconds, and places of the bodies; `None` where there is no answer."""
-    return within(LIMIT, lambda: Scene(source, setting).timed(end, rounds, patience))
+def run(source, setting, end, rounds, patience, limit):
+    """Seconds, and places of the bodies; `None` where there is no answer within the limit, s."""
+    scene = Scene(source, setting)
+    return within(limit, lambda: scene.timed(end, rounds, patience))
 
 
 def check(source, free, start, first, end, places):
