@@ -143,7 +143,7 @@ report only.
   the worst for us of all its runs with errors of at most {useful:g} m: programs that need not be exact are quick. Best errors of
   settings that do not converge are also luck of a step: look at their neighbours.
 - The aim is missed by quadrupeds. MuJoCo takes a third of our time to its least error for the dropped one, which is 1 mm, and
-  which its neighbours do not reach. To errors of 0.01 to 1 mm, it computes the standing one as fast as we do to 1e-15 m, or
+  which its neighbours do not reach. To errors of 0.04 to 1 mm, it computes the standing one as fast as we do to 1e-15 m, or
   faster, and Drake is less than 10 times slower: our time does not fall with looser tolerances, which meet more events.
 
 ![Error of the end state against run time](figures/contacts.svg)
