@@ -1,11 +1,12 @@
-"""Error of the end state against run time: motions with contacts by this project and by MuJoCo, in one run.
+"""Error of the end state against run time: motions with contacts by this project, MuJoCo and Drake, in one run.
 
 usage: compare.py OURS WORK [SCENE ...]
 
 OURS is the executable of `ours/`, WORK a folder for models and results. Each scene is one TOML model of this project;
-`mjcf.py` writes the same numbers for MuJoCo. The error is the largest distance, over all bodies, between where their
+`mjcf.py` writes the same numbers for MuJoCo, `drake_scene.py` builds them in Drake, and before anything is timed, both are
+compared with ours in a motion without contacts. The error is the largest distance, over all bodies, between where their
 origins and centres of mass end and where they should: by analysis where the answer is known, else by this project's run at
-its tightest tolerance. Both run in one thread, and times are the least of several rounds within the process that runs them.
+its tightest tolerance. All run in one thread, and times are the least of several rounds within the process that runs them.
 """
 
 import json
@@ -21,12 +22,25 @@ import numpy as np
 import mjcf
 import report
 
+try:
+    import drake_scene
+except ImportError as missing:
+    drake_scene = None
+    print(f"Drake is left out: {missing}", file=sys.stderr)
+
 MODELS = pathlib.Path(__file__).resolve().parents[2] / "models" / "contacts"
 TOLERANCES = ["1e-3", "1e-4", "1e-5", "1e-6", "1e-7", "1e-8", "1e-9", "1e-10", "1e-11", "1e-12", "1e-13"]
 STEPS = [4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5]
 ROUNDS = 3
 # A run of a rival that takes longer than this is its last one with these settings, s.
 PATIENCE = 3.0
+# Seconds after which Drake is stopped: some of its integrators do not come back.
+LIMIT = 15.0
+# Without contacts, all programs are exact to rounding and to what their integrators leave over in this time, s: far below this
+# bound, m or J. A wrong number of a model is far above. MuJoCo's least moments of inertia are within it.
+FREE, BOUND = 0.3, 1e-8
+# Of the ball, m/s², m, and of its restitution.
+GRAVITY, HEIGHT, RESTITUTION = 9.81, 1.0, 0.8
 
 
 def block():
@@ -42,8 +56,8 @@ def block():
 def ball():
     """Falls 1 m and bounces three times with a restitution of 0.8."""
     text = (MODELS / "bouncing_ball.toml").read_text()
-    end, g, e = 2.0, 9.81, 0.8
-    t, v = math.sqrt(2 / g), e * math.sqrt(2 * g)
+    end, g, e = 2.0, GRAVITY, RESTITUTION
+    t, v = math.sqrt(2 * HEIGHT / g), e * math.sqrt(2 * HEIGHT * g)
     while t + 2 * v / g < end:
         t, v = t + 2 * v / g, e * v
     at = [0, 0, 0.05 + v * (end - t) - 0.5 * g * (end - t) ** 2]
@@ -77,7 +91,7 @@ def damping_ratio(e):
     return low
 
 
-def settings(scene, step):
+def mujoco_settings(scene, step):
     """Settings by name: MuJoCo's defaults, and what makes its contacts harder."""
     default, hard = "0.9 0.95 0.001 0.5 2", "0.99 0.9999 0.0001 0.5 2"
 
@@ -86,7 +100,7 @@ def settings(scene, step):
         return {"option": option | more, "solref": solref, "solimp": solimp, "limits": solref if solref[0] != "-" else "0.02 1"}
 
     if scene == "ball":
-        z = damping_ratio(0.8)
+        z = damping_ratio(RESTITUTION)
         bounce = {}
         for steps in (10, 40):
             frequency = math.pi / (steps * step)
@@ -112,7 +126,7 @@ def error(places, wanted):
     return float(np.max(np.linalg.norm(np.asarray(places) - np.asarray(wanted), axis=1)))
 
 
-def rival(scene, setting, end):
+def mujoco_run(scene, setting, end):
     """Seconds, and places of the bodies in the order of the file."""
     model = mujoco.MjModel.from_xml_string(scene.mjcf(setting))
     data = mujoco.MjData(model)
@@ -135,30 +149,84 @@ def rival(scene, setting, end):
     return least, places
 
 
+def without_contacts(text):
+    """The model without contacts and limits of joints."""
+    kept, skip = [], False
+    for line in text.splitlines():
+        if line.startswith("["):
+            skip = line.startswith("[[contact]]")
+        if not skip and not line.startswith("limits"):
+            kept.append(line)
+    return "\n".join(kept)
+
+
+def our_runs(ours, path, end, rounds, tolerances):
+    """Mass and energies at the start, and the runs."""
+    command = [ours, str(path), repr(end), str(rounds), *tolerances]
+    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
+    start, *runs = [json.loads(line) for line in lines]
+    return start, runs
+
+
+def check(name, text, ours, work, scene, first):
+    """Stops where a rival's model is not ours."""
+    path = work / f"{name}_free.toml"
+    path.write_text(without_contacts(text))
+    start, (run,) = our_runs(ours, path, FREE, 1, ["1e-12"])
+    free = mjcf.Scene(path)
+    exact = {"option": {"timestep": 1e-4, "integrator": "RK4"}, "solref": "0.02 1", "solimp": "0.9 0.95 0.001 0.5 2", "limits": "0.02 1"}
+    apart = {"MuJoCo, motion without contacts": error(mujoco_run(free, exact, FREE)[1], run["places"])}
+    if drake_scene:
+        found = drake_scene.check(scene, free, start, first, FREE, run["places"])
+        apart |= {f"Drake, {what}": value for what, value in found.items()}
+    for what, value in apart.items():
+        print(f"{name}: {what}: {value:.1e} from ours", flush=True)
+        if not value < BOUND:
+            sys.exit(f"{name}: the models differ")
+
+
+def series(run, settings):
+    """Runs of settings by name; one that takes too long is the last of its setting."""
+    runs = []
+    for setting, (knob, values) in settings.items():
+        for value, how in values.items():
+            answer = run(how)
+            if answer is not None:
+                seconds, off = answer
+                runs.append({"setting": setting, knob: value, "seconds": seconds, "error": off})
+            if answer is None or seconds > PATIENCE:
+                break
+    return runs
+
+
 def compare(name, ours, work):
     title, make = SCENES[name]
     text, end, known = make()
     path = work / f"{name}.toml"
     path.write_text(text)
     # All tolerances twice: in the first pass, machine code is made for the modes in which the motion stays.
-    command = [ours, str(path), repr(end), str(ROUNDS), *TOLERANCES, *TOLERANCES]
-    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
-    runs = [json.loads(line) for line in lines[len(TOLERANCES) :]]
+    _, runs = our_runs(ours, path, end, ROUNDS, TOLERANCES * 2)
+    runs = runs[len(TOLERANCES) :]
     wanted = known or runs[-1]["places"]
     mine = [
         {"setting": f"tolerance {r['tolerance']:g}", "seconds": r["seconds"], "error": error(r["places"], wanted), "events": len(r["events"])}
         for r in (runs if known else runs[:-1])
     ]
-    scene, theirs, slow = mjcf.Scene(path), [], set()
-    for step in STEPS:
-        for setting, values in settings(name, step).items():
-            if setting in slow:
-                continue
-            seconds, places = rival(scene, values, end)
-            theirs.append({"setting": setting, "step": step, "seconds": seconds, "error": error(places, wanted)})
-            if seconds > PATIENCE:
-                slow.add(setting)
-    return {"name": name, "title": title, "end": end, "known": known is not None, "ours": mine, "mujoco": theirs}
+    scene = mjcf.Scene(path)
+    check(name, text, ours, work, scene, runs[-1]["events"][0])
+
+    def measured(answer):
+        return answer and (answer[0], error(answer[1], wanted))
+
+    by_step = {step: mujoco_settings(name, step) for step in STEPS}
+    settings = {s: ("step", {step: by_step[step][s] for step in STEPS}) for s in by_step[STEPS[0]]}
+    rivals = {"MuJoCo": series(lambda how: measured(mujoco_run(scene, how, end)), settings)}
+    if drake_scene:
+        speed = math.sqrt(2 * GRAVITY * HEIGHT)
+        ball = RESTITUTION, damping_ratio(RESTITUTION), scene.model["body"][0]["mass"], speed
+        settings = drake_scene.settings(name, STEPS, ball)
+        rivals["Drake"] = series(lambda how: measured(drake_scene.run(scene, how, end, ROUNDS, PATIENCE, LIMIT)), settings)
+    return {"name": name, "title": title, "end": end, "known": known is not None, "ours": mine, "rivals": rivals}
 
 
 def main():
@@ -169,7 +237,8 @@ def main():
     for name in names or SCENES:
         results.append(compare(name, ours, work))
         print(f"{name}: done", flush=True)
-    result = {"mujoco": mujoco.__version__, "scenes": results}
+    versions = {"MuJoCo": mujoco.__version__} | ({"Drake": drake_scene.VERSION} if drake_scene else {})
+    result = {"versions": versions, "limit": LIMIT, "scenes": results}
     (work / "result.json").write_text(json.dumps(result, indent=1) + "\n")
     report.write(result, work)
 

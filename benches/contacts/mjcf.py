@@ -69,12 +69,33 @@ class Scene:
         self.joints = self.model["joint"]
         self.names = {s["name"]: s for s in self.model.get("shape", [])}
 
+    def place(self, item):
+        """Of a joint's frame or of a shape in its body, and its orientation."""
+        return item.get("xyz", [0, 0, 0]), quaternion(numbers(item.get("rpy", [0, 0, 0])))
+
+    def friction(self, contact):
+        return contact.get("friction", self.model.get("contacts", {}).get("friction", 0))
+
+    def start(self, joint):
+        """Coordinates and velocities at the start. Quaternions are w, x, y, z; linear velocities are in the axes of the joint's
+        frame, the angular one of a floating joint in those of the body."""
+        kind, q, v = joint["type"], joint.get("start"), joint.get("start_velocity")
+        if kind == "floating":
+            q, v = q or [0, 0, 0, 0, 0, 0, 1], v or [0.0] * 6
+            own = [q[6], *q[3:6]]
+            return [*q[:3], *own], [*turned(own, v[:3]), *v[3:]]
+        if kind == "planar":
+            q, v = q or [0.0] * 3, v or [0.0] * 3
+            c, s = math.cos(q[2]), math.sin(q[2])
+            return q, [c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]]
+        return [number(q or 0)], [number(v or 0)]
+
     def shapes(self, body):
         text = ""
         for shape in self.names.values():
             if shape.get("body", "ground") != body:
                 continue
-            turn = quaternion(numbers(shape.get("rpy", [0, 0, 0])))
+            place, turn = self.place(shape)
             kind = shape["type"]
             if kind == "plane":
                 turn, size = times(turn, towards(shape.get("normal", [0, 0, 1]))), [0, 0, 1]
@@ -84,39 +105,34 @@ class Scene:
                 # A point is a ball of a micrometre.
                 kind, size = "sphere", [shape.get("radius", 1e-6)]
             text += (
-                f'<geom name="{shape["name"]}" type="{kind}" size="{words(size)}" pos="{words(shape.get("xyz", [0, 0, 0]))}" '
+                f'<geom name="{shape["name"]}" type="{kind}" size="{words(size)}" pos="{words(place)}" '
                 f'quat="{words(turn)}" mass="0" contype="0" conaffinity="0"/>\n'
             )
         return text
 
     def body(self, joint):
         body = self.bodies[joint["child"]]
-        place, turn = joint.get("xyz", [0, 0, 0]), quaternion(numbers(joint.get("rpy", [0, 0, 0])))
+        place, turn = self.place(joint)
         axis, kind, name = joint.get("axis", [0, 0, 1]), joint["type"], joint["name"]
         inertia = [max(v, LEAST) for v in body.get("inertia", [0, 0, 0])]
-        start, rates = joint.get("start"), joint.get("start_velocity")
+        start, rates = self.start(joint)
         text = f'<body name="{body["name"]}" pos="{words(place)}" quat="{words(turn)}">\n'
         if kind == "floating":
-            start, rates = start or [0, 0, 0, 0, 0, 0, 1], rates or [0.0] * 6
-            own = [start[6], *start[3:6]]
             at = [a + b for a, b in zip(place, turned(turn, start[:3]))]
-            whole = times(turn, own)
-            self.qpos += [*at, *whole]
-            self.qvel += [*turned(whole, rates[:3]), *rates[3:]]
+            self.qpos += [*at, *times(turn, start[3:])]
+            self.qvel += [*turned(turn, rates[:3]), *rates[3:]]
             text += f'<freejoint name="{name}"/>\n'
         elif kind == "planar":
             plane = towards(axis)
             x, y, n = (turned(plane, v) for v in ([1, 0, 0], [0, 1, 0], [0, 0, 1]))
-            start, rates = start or [0.0] * 3, rates or [0.0] * 3
-            c, s = math.cos(start[2]), math.sin(start[2])
             self.qpos += start
-            self.qvel += [c * rates[0] - s * rates[1], s * rates[0] + c * rates[1], rates[2]]
+            self.qvel += rates
             for letter, direction in (("x", x), ("y", y)):
                 text += f'<joint name="{name}_{letter}" type="slide" axis="{words(direction)}"/>\n'
             text += f'<joint name="{name}" type="hinge" axis="{words(n)}"/>\n'
         else:
-            self.qpos.append(number(start or 0))
-            self.qvel.append(number(rates or 0))
+            self.qpos += start
+            self.qvel += rates
             more = ""
             if "limits" in joint:
                 more += f' limited="true" range="{words(numbers(joint["limits"]))}" solreflimit="SOLREF" solimplimit="SOLIMP"'
@@ -136,12 +152,11 @@ class Scene:
     def mjcf(self, settings):
         """The file, with attributes of <option> and the `solref` and `solimp` of all contacts and limits."""
         self.qpos, self.qvel = [], []
-        common = self.model.get("contacts", {})
         bodies = "".join(self.body(j) for j in self.joints if j.get("parent", "ground") == "ground")
         pairs = ""
         for contact in self.model.get("contact", []):
             a, b = contact["between"]
-            mu = contact.get("friction", common.get("friction", 0))
+            mu = self.friction(contact)
             # Without friction one dimension; a coefficient of zero is not allowed.
             dimensions = 3 if mu > 0 else 1
             mu = max(mu, 1e-5)
