@@ -100,20 +100,18 @@ fn compare(what: &str, model: &Model, output: Output, count: usize, seed: u64) -
 
 #[test]
 fn random_mechanisms_have_the_same_bits_in_every_way() {
-    let (mut mechanisms, mut refused) = (0, 0);
+    let mut mechanisms = 0;
     for seed in 0.. {
         if mechanisms == 100 {
             break;
         }
-        let Some(model) = with_contacts(seed) else { continue };
+        // More contacts on one limb have thousands of modes, each of which is traced.
+        let Some(model) = with_contacts(seed).filter(|model| model.contacts.len() <= 4) else { continue };
         let output = OUTPUTS[seed as usize % 3];
-        match compare(&format!("seed {seed}"), &model, output, 6, seed) {
-            Some(_) => mechanisms += 1,
-            None => refused += 1,
-        }
+        let all = compare(&format!("seed {seed}"), &model, output, 6, seed);
+        assert!(all.is_some(), "seed {seed} is refused");
+        mechanisms += 1;
     }
-    // What is refused has too many modes on one limb.
-    assert!(refused < 100, "{refused}");
 }
 
 #[test]

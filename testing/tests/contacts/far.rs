@@ -19,6 +19,7 @@ use mbd_runtime::tree::Source;
 use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
 use mbd_testing::random::with_contacts;
 use mbd_testing::state::random_state;
+use mbd_testing::toml::to_toml;
 
 use super::scene::{model, Scene};
 
