@@ -5,7 +5,9 @@ use std::collections::BTreeSet;
 use mbd_runtime::contact::{rows_that_act, Mode};
 
 use crate::error::GenerateError;
-use crate::factored::{factored, FactoredProgram};
+#[cfg(feature = "factored")]
+use crate::factored::factored;
+use crate::factored::FactoredProgram;
 use crate::modes::{ModeChoice, OF_EACH_SET};
 use crate::options::{Arithmetic, Options, Precision};
 use crate::output::{Output, OutputProgram, Sizes};
@@ -122,13 +124,17 @@ impl Programs {
     pub fn of_modes(full: &Plan, choice: &ModeChoice, options: &Options) -> Result<Programs, GenerateError> {
         let sets = choice.sets(&full.model)?;
         let gaps = |output: &Output| *output == Output::Gaps;
+        #[cfg(feature = "factored")]
         let in_pieces = |output: &Output| *choice == ModeChoice::Factored && OF_EACH_SET.contains(output);
+        #[cfg(not(feature = "factored"))]
+        let in_pieces = |_: &Output| false;
         let others = options.outputs.iter().copied().filter(|o| !gaps(o) && !in_pieces(o)).collect();
         let others = Options { outputs: others, ..options.clone() };
         let mut programs = Programs::new(&full.masked(), &others)?;
         for output in options.outputs.iter().filter(|o| gaps(o)) {
             programs.outputs.push(compile(full, *output, options)?);
         }
+        #[cfg(feature = "factored")]
         for output in options.outputs.iter().filter(|o| in_pieces(o)) {
             let program = factored(full, *output, options);
             let program = program.ok_or_else(|| GenerateError::ModesNotFactored { model: full.model.name.clone() })?;

@@ -19,7 +19,8 @@ pub enum ModeChoice {
     /// One function for all modes: every row is computed, and numbers say which act.
     Masked,
     /// Functions that are put together from pieces, of limbs in their modes and of the trunk for each sequence of limbs
-    /// that touch.
+    /// that touch; needs the feature `factored`.
+    #[cfg(feature = "factored")]
     Factored,
     /// Beside it, functions for some sets of modes, each of which has one mode for each contact of the model.
     Listed(Vec<Vec<Mode>>),
@@ -37,7 +38,9 @@ impl ModeChoice {
             return Err(GenerateError::ModesNeedContacts { model: model.name.clone() });
         }
         match self {
-            ModeChoice::Masked | ModeChoice::Factored => Ok(Vec::new()),
+            ModeChoice::Masked => Ok(Vec::new()),
+            #[cfg(feature = "factored")]
+            ModeChoice::Factored => Ok(Vec::new()),
             ModeChoice::Listed(sets) => {
                 let mut distinct: Vec<Vec<Mode>> = Vec::new();
                 for set in sets {

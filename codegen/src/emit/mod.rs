@@ -1,6 +1,7 @@
 //! Programs as Rust source. Only this module knows Rust syntax.
 
 pub(crate) mod constants;
+#[cfg(feature = "factored")]
 mod factored;
 pub(crate) mod fields;
 pub(crate) mod head;
@@ -20,6 +21,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use crate::code::{Code, Programs};
+#[cfg(feature = "factored")]
 use crate::factored::FactoredProgram;
 use crate::options::Options;
 use crate::output::{InputArray, Output, OutputProgram, Sizes};
@@ -83,6 +85,7 @@ pub fn source(input: &Input) -> String {
     for (function, kernel) in functions.iter().zip(&kernels) {
         let program = match &function.program {
             Kind::Whole(program) => *program,
+            #[cfg(feature = "factored")]
             Kind::Factored(program) => {
                 let lanes::Kernel { id, signature, ports } = kernel;
                 let _ = write!(out, "\n{}", signature.documentation());
@@ -134,6 +137,7 @@ enum Kind<'a> {
     /// One program.
     Whole(&'a OutputProgram<Code>),
     /// Pieces for the modes of contacts.
+    #[cfg(feature = "factored")]
     Factored(&'a OutputProgram<FactoredProgram>),
 }
 
@@ -151,6 +155,7 @@ impl Function<'_> {
     fn signature(&self, sizes: &Sizes) -> Signature {
         let spec = match &self.program {
             Kind::Whole(program) => program.spec,
+            #[cfg(feature = "factored")]
             Kind::Factored(program) => program.spec,
         };
         let whole = Signature::new(spec, sizes);
@@ -163,6 +168,7 @@ impl Function<'_> {
     fn inputs(&self) -> &[InputArray] {
         match &self.program {
             Kind::Whole(program) => &program.inputs,
+            #[cfg(feature = "factored")]
             Kind::Factored(program) => &program.inputs,
         }
     }
@@ -170,6 +176,7 @@ impl Function<'_> {
     fn used_inputs(&self) -> BTreeSet<usize> {
         match &self.program {
             Kind::Whole(program) => program.program.used_inputs(),
+            #[cfg(feature = "factored")]
             Kind::Factored(program) => program.program.used_inputs(),
         }
     }
@@ -183,6 +190,7 @@ fn functions<'a>(Input { plan, programs, .. }: &Input<'a>, contacts: Option<&Con
         let first = part.is_some();
         functions.push(Function { program: Kind::Whole(program), plan, part, first });
     }
+    #[cfg(feature = "factored")]
     functions.extend(programs.factored.iter().map(|program| Function {
         program: Kind::Factored(program),
         plan,

@@ -6,6 +6,7 @@ use mbd_runtime::sweep::Quantity;
 
 pub use crate::names::identifier;
 
+#[cfg(feature = "factored")]
 use crate::factored::{Piece, Source};
 use crate::output::{locate, InputArray};
 use crate::plan::Plan;
@@ -79,6 +80,7 @@ impl Names {
     }
 
     /// Names of a piece of factored code.
+    #[cfg(feature = "factored")]
     pub fn piece(self, plan: &Plan, piece: &Piece, inputs: &[InputArray]) -> BTreeMap<u32, String> {
         let body = |node: Option<usize>| node.map_or("ground".to_string(), |i| identifier(&plan.nodes[i].name));
         let source = |k: usize| match piece.inputs[k] {

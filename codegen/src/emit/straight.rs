@@ -13,7 +13,7 @@ use super::names::{heading, Names};
 use super::together::TogetherWriter;
 use crate::plan::Plan;
 use crate::rolled::Vectors;
-use crate::symbolic::angles::{nodes, pairs, Angles, Pairs};
+use crate::symbolic::angles::{nodes, Angles, Pairs};
 use crate::symbolic::{Label, Op, Program, ProgramResult};
 
 /// A program with names for its values and places for its results.
@@ -44,6 +44,7 @@ impl<'a> Straight<'a> {
         Straight { plan, head, program, names, angles: Angles::new(program), sources: None }
     }
 
+    #[cfg(feature = "factored")]
     /// Statements of one state whose inputs are read as `sources` say, as the body of a function that has a head of its
     /// own.
     pub fn piece(
@@ -53,10 +54,11 @@ impl<'a> Straight<'a> {
         names: BTreeMap<u32, String>,
         sources: &'a [String],
     ) -> Self {
-        let angles = Angles { late: pairs(program), ..Angles::default() };
+        let angles = Angles { late: crate::symbolic::angles::pairs(program), ..Angles::default() };
         Straight { plan, head, program, names, angles, sources: Some(sources) }
     }
 
+    #[cfg(feature = "factored")]
     /// The statements of a piece, and its results as they are written.
     pub fn write_piece(&self, out: &mut String) -> Vec<String> {
         let all = self.program.steps.iter().map(|(id, ..)| *id).collect();

@@ -10,7 +10,9 @@
 //! The pieces are cut out of the symbolic runs of the sweeps that functions for single sets of modes are made from
 //! ([`tracing`] says where), so the operations and the bits are theirs.
 
+#[cfg(feature = "factored")]
 mod pieces;
+#[cfg(feature = "factored")]
 mod tracing;
 
 use std::collections::BTreeSet;
@@ -20,6 +22,7 @@ use mbd_runtime::Scalar;
 
 use crate::symbolic::{Counts, Program};
 
+#[cfg(feature = "factored")]
 pub use pieces::factored;
 
 /// Where a number that a piece reads comes from.

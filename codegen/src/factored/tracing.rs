@@ -635,7 +635,7 @@ fn trunk(plan: &Plan) -> (Vec<bool>, Option<usize>) {
         });
     }
     let common = common.unwrap_or_default();
-    // One limb alone has no trunk: it reaches to the ground.
+    // Where there is one contact only, its own body is the outermost node of the trunk.
     let trunk = (0..plan.nodes.len()).map(|i| common.contains(&i)).collect();
     (trunk, common.first().copied())
 }

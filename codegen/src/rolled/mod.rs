@@ -29,7 +29,9 @@ use crate::symbolic::{Counts, Label, Program, ProgramResult};
 
 pub use cost::cost;
 pub use mbd_runtime::sweep::pass::SweepDirection;
+#[cfg(feature = "factored")]
 pub(crate) use partition::{assemble, nodes, output};
+#[cfg(feature = "factored")]
 pub(crate) use pass_state::{read, OutputSweeps, PassState};
 pub use runs::{find, Run};
 pub use siblings::WIDTH;

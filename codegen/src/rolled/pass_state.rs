@@ -158,6 +158,7 @@ impl<'g, 'a> PassState<'g, 'a> {
         self.each(pass, given, |sweep, cx| (sweep.carried)(cx, i, &mut visit));
     }
 
+    #[cfg(feature = "factored")]
     /// The same with the number of the sweep among those of the output, and that of the value among those of the sweep.
     pub fn carried_by_sweeps(
         &mut self,
@@ -183,6 +184,7 @@ impl<'g, 'a> PassState<'g, 'a> {
         self.each(pass, given, |sweep, cx| (sweep.running)(cx, &mut visit));
     }
 
+    #[cfg(feature = "factored")]
     /// The solutions for the unknowns so far: which of the two linear problems (0: velocities, 1: accelerations), which
     /// unknown, and its value.
     pub fn unknowns(&mut self) -> impl Iterator<Item = (usize, usize, &mut Expr<'g>)> {

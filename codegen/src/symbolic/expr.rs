@@ -221,6 +221,7 @@ impl Graph {
     }
 
     /// An operation like another one on other operands, with its label and name.
+    #[cfg(feature = "factored")]
     pub fn like(&self, id: u32, op: Op) -> Expr<'_> {
         let (_, label) = self.get(id);
         self.label.set(label);
