@@ -70,6 +70,9 @@ struct Plot {
     needs: BTreeSet<u32>,
 }
 
+/// What a piece computes, and what is wanted of it.
+type Made = (BTreeSet<u32>, Vec<(ProgramResult, Wanted)>);
+
 /// What a trunk computes: before the limbs, and at the end.
 type TrunkWanted = [Vec<(ProgramResult, Wanted)>; 2];
 
@@ -444,8 +447,7 @@ impl<'g, 'a> Cutting<'g, 'a> {
             });
             operands.chain(results).filter(|id| !own.contains(id)).collect()
         };
-        let mut pieces: Vec<(BTreeSet<u32>, Vec<(ProgramResult, Wanted)>)> =
-            vec![(always, Vec::new()), (touching, Vec::new())];
+        let mut pieces: Vec<Made> = vec![(always, Vec::new()), (touching, Vec::new())];
         pieces.extend(owned.into_iter().zip(&plots).map(|(own, plot)| (own, plot.wanted.clone())));
         let of_plot = |k: usize| k + 2;
         let read: Vec<BTreeSet<u32>> = pieces.iter().map(|(own, wanted)| reads(own, wanted)).collect();
