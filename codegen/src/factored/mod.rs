@@ -8,7 +8,7 @@
 //! a quadruped on its left feet is that of a quadruped on its right ones.
 //!
 //! The pieces are cut out of the symbolic runs of the sweeps that functions for single sets of modes are made from
-//! ([`tracing`] says where), so the operations and the bits are theirs.
+//! (`tracing.rs` says where), so the operations and the bits are theirs.
 
 #[cfg(feature = "factored")]
 mod pieces;
