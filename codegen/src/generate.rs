@@ -7,7 +7,6 @@ use crate::emit;
 #[doc(hidden)]
 pub use crate::emit::quantity;
 pub use crate::error::GenerateError;
-use crate::factored::Group;
 use crate::model::Model;
 use crate::modes::OF_EACH_SET;
 pub use crate::options::{Arithmetic, LikeBranches, Options, Precision, RolledCode};
@@ -82,16 +81,12 @@ pub fn generate_from(plan: &Plan, options: &Options) -> Result<Generated, Genera
     });
     let pieces = options.outputs.iter().filter_map(|output| {
         let program = &programs.factored.iter().find(|program| program.spec.name == output.name())?.program;
-        let of = |number: fn(&Group) -> usize| {
-            let limbs: Vec<usize> = program.groups.iter().map(number).collect();
-            program.counts_of(&program.choice(limbs)).total()
-        };
         Some(CountsOfPieces {
             output: *output,
-            count: program.pieces().filter(|piece| !piece.is_empty()).count(),
+            count: program.count(),
             operations: program.counts().total(),
-            flight: of(|_| 0),
-            stick: of(|group| group.modes.len() - 1),
+            flight: program.in_flight(),
+            stick: program.sticking(),
         })
     });
     let (pieces, notices) = (pieces.collect(), plan.notices.clone());

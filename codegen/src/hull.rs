@@ -3,9 +3,9 @@
 //! Corners are found from inside: the point that is farthest from the hull of those that were taken is taken next. Distances
 //! are those of the algorithm of Gilbert, Johnson and Keerthi, which needs no faces, so that points in a plane, on a line or
 //! twice in the list are no special cases. They only fall while points are taken: most points are looked at a few times.
-//! (parry3d-f64 was tried: it keeps points of flat faces in single precision, so that it does not save this, and compiling its
-//! 46 crates for tests, lints and the release takes 86 s.) Arithmetic is that of IEEE alone, in an order that depends on nothing but the points, so that every host finds the same
-//! corners.
+//! (parry3d-f64 was tried: it keeps points of flat faces in single precision, so that it does not save this, and brings 46
+//! crates.) Arithmetic is that of IEEE alone, in an order that depends on nothing but the points, so that every host finds
+//! the same corners.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;

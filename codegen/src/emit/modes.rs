@@ -225,10 +225,7 @@ impl<'a> Contacts<'a> {
         }
         for program in self.factored {
             let (name, program) = (program.spec.name, &program.program);
-            let pieces = program.pieces().filter(|piece| !piece.is_empty()).count();
-            let flight = program.counts_of(&program.choice(vec![0; program.groups.len()])).total();
-            let stick = program.groups.iter().map(|group| group.modes.len() - 1).collect();
-            let stick = program.counts_of(&program.choice(stick)).total();
+            let (pieces, flight, stick) = (program.count(), program.in_flight(), program.sticking());
             lines.push(format!(
                 "{name}: {pieces} pieces of {} operations; {flight} where nothing touches, {stick} where everything sticks",
                 program.counts().total()

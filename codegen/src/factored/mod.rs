@@ -8,10 +8,18 @@
 //! a quadruped on its left feet is that of a quadruped on its right ones.
 //!
 //! The pieces are cut out of the symbolic runs of the sweeps that functions for single sets of modes are made from
-//! (`tracing.rs` says where), so the operations and the bits are theirs.
+//! (`cuts.rs` says where), so the operations and the bits are theirs.
 
 #[cfg(feature = "factored")]
+mod cuts;
+#[cfg(feature = "factored")]
+mod layout;
+#[cfg(feature = "factored")]
+mod limbs;
+#[cfg(feature = "factored")]
 mod pieces;
+#[cfg(feature = "factored")]
+mod symbols;
 #[cfg(feature = "factored")]
 mod tracing;
 
@@ -214,6 +222,22 @@ impl FactoredProgram {
     /// Counts of the operations of all pieces together: the length of the code.
     pub fn counts(&self) -> Counts {
         self.pieces().map(|piece| piece.program.counts()).fold(Counts::default(), Counts::plus)
+    }
+
+    /// Number of pieces that do something.
+    pub fn count(&self) -> usize {
+        self.pieces().filter(|piece| !piece.is_empty()).count()
+    }
+
+    /// Operations that are executed where all contacts are open.
+    pub fn in_flight(&self) -> usize {
+        self.counts_of(&self.choice(vec![0; self.groups.len()])).total()
+    }
+
+    /// The same where every contact sticks, or is closed if it has no friction.
+    pub fn sticking(&self) -> usize {
+        let last = self.groups.iter().map(|group| group.modes.len() - 1).collect();
+        self.counts_of(&self.choice(last)).total()
     }
 
     /// Numbers of the inputs that are read, those by which the pieces are chosen among them.

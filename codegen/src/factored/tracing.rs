@@ -8,72 +8,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use mbd_runtime::contact::{rows_that_act, Contact, Mode};
+use mbd_runtime::contact::{Contact, Mode};
 use mbd_runtime::tree::Unknown;
+use mbd_runtime::Scalar;
 
-use crate::modes::modes_of;
+use super::limbs::{limbs, of_contacts, reaches, trunk, Limb, MOST_LIMB_MODES};
+use super::symbols::{Class, Crossing, Symbol};
 use crate::options::Options;
-use crate::output::Output;
-use crate::plan::{Plan, PlanBond};
-use crate::rolled::{nodes, output, read, OutputSweeps, PassState, SweepDirection};
-use crate::symbolic::{Expr, Graph, Op, Operand, ProgramResult};
-use crate::trace::{tolerance, SymbolicInputs};
-
-/// A number that passes between the trunk and limbs in all modes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Crossing {
-    /// What a sweep hands on at node `node`, by the sweep and a number: outward from the trunk, inward from a limb.
-    Carried { node: usize, value: [usize; 2] },
-    /// Multiplier of a loop or rate of a shared coordinate.
-    Unknown { level: usize, unknown: usize },
-}
-
-/// What a symbol stands for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Symbol {
-    /// Number `entry` of what the `place`-th of the limbs that touch hands to the trunk.
-    Handed { place: usize, entry: usize },
-    /// A number that a limb hands to the trunk in all of its modes.
-    FromLimb(Crossing),
-    /// A number of the trunk.
-    Trunk(Crossing),
-    /// The multiplier of a row of a contact, in a limb.
-    Multiplier { level: usize, unknown: usize },
-    /// Number `entry` of what the `place`-th of the limbs that touch gives back to the trunk for the end.
-    Returned { place: usize, entry: usize },
-    /// A number that a limb gives back in all of its modes.
-    BackFromLimb(Crossing),
-}
-
-/// What a value depends on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Class {
-    /// On what limbs have handed to the trunk.
-    pub handed: bool,
-    /// On the solution of the trunk.
-    pub late: bool,
-    /// On what limbs have given back.
-    pub returned: bool,
-    /// On the modes of these groups, one bit each, by what is theirs alone.
-    pub groups: u64,
-}
-
-impl Class {
-    /// Whether it is known before the trunk.
-    pub fn is_early(self) -> bool {
-        !self.handed && !self.late && !self.returned
-    }
-}
-
-/// Largest number of modes of all limbs together.
-pub const MOST_LIMB_MODES: usize = 512;
-
-/// The contacts that act together on one limb, and their modes; the first mode is that in which all are open.
-#[derive(Clone, Debug)]
-pub struct Limb {
-    pub contacts: Vec<usize>,
-    pub modes: Vec<Vec<Mode>>,
-}
+use crate::output::{InputArray, Output};
+use crate::plan::Plan;
+use crate::rolled::{nodes, OutputSweeps};
+use crate::symbolic::{Expr, Graph, Op, ProgramResult};
+use crate::trace::SymbolicInputs;
 
 /// A number that a limb hands to the trunk: a node of the graph or its negative, because legs of the two sides have
 /// columns of other signs, which the trunk is not to see.
@@ -82,11 +28,11 @@ pub struct Handed {
     pub id: u32,
     pub neg: bool,
     /// What it is: numbers of two kinds that are equal in some modes are not so in others.
-    kind: Kind,
+    pub kind: Kind,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+pub enum Kind {
     /// Diagonal entries of the rows before any elimination.
     Whole,
     /// Everything else.
@@ -94,7 +40,7 @@ enum Kind {
 }
 
 /// A symbolic run in one set of modes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Traced<'g> {
     pub results: Vec<Expr<'g>>,
     /// Values of the symbols of the trunk.
@@ -123,26 +69,20 @@ pub struct Tracing<'g, 'a> {
     flight: usize,
     /// What each limb in each of its modes computes that flight does not.
     members: BTreeMap<(usize, usize), BTreeSet<u32>>,
-    /// What crosses from the trunk in some set of modes, and so in all.
-    always: BTreeSet<Crossing>,
-    /// What crosses to the trunk in some mode of a limb, and exists in flight.
-    of_limb: BTreeSet<Crossing>,
-    /// What has been found to be so.
-    found: BTreeSet<Crossing>,
-    /// What crosses to the trunk in flight.
-    in_flight: BTreeMap<Crossing, ProgramResult>,
-    /// What crosses from the trunk in flight, and what has been found to differ from it.
-    trunk_in_flight: BTreeMap<Crossing, ProgramResult>,
-    found_of_trunk: BTreeSet<Crossing>,
+    /// What crosses in flight, and differs from it in some mode: it crosses as a symbol in all modes.
+    pub(super) in_flight: BTreeMap<Crossing, ProgramResult>,
+    pub(super) always: BTreeSet<Crossing>,
+    /// What has been found to be so since.
+    pub(super) found: BTreeSet<Crossing>,
     /// Whether the rows of each contact come to the trunk.
-    reaching: Vec<bool>,
-    full: &'a Plan,
-    output: Output,
-    options: &'a Options,
-    contacts: Vec<Contact<f64>>,
+    pub(super) reaching: Vec<bool>,
+    pub(super) full: &'a Plan,
+    pub(super) output: Output,
+    pub(super) options: &'a Options,
+    pub(super) contacts: Vec<Contact<f64>>,
     /// Whether a node belongs to the trunk; the outermost one of it.
-    trunk: Vec<bool>,
-    root: Option<usize>,
+    pub(super) trunk: Vec<bool>,
+    pub(super) root: Option<usize>,
     /// First nodes of the branches of each limb.
     branches: Vec<BTreeSet<usize>>,
 }
@@ -154,7 +94,7 @@ impl<'g, 'a> Tracing<'g, 'a> {
         OutputSweeps::of(output)?;
         // Which rows act is an input of the function, by which it chooses its pieces; no operation reads it.
         let given = Rc::new(SymbolicInputs::new(graph, &full.masked(), output.spec(), options));
-        let first = given.arrays.iter().map(crate::output::InputArray::len).sum();
+        let first = given.arrays.iter().map(InputArray::len).sum();
         // The tree whose elimination the output uses.
         let plan = match output {
             Output::Multipliers => full.accelerations.as_deref().unwrap_or(full),
@@ -177,35 +117,28 @@ impl<'g, 'a> Tracing<'g, 'a> {
             classes: Vec::new(),
             flight: 0,
             members: BTreeMap::new(),
-            always: BTreeSet::new(),
-            of_limb: BTreeSet::new(),
-            found: BTreeSet::new(),
             in_flight: BTreeMap::new(),
-            trunk_in_flight: BTreeMap::new(),
-            found_of_trunk: BTreeSet::new(),
+            always: BTreeSet::new(),
+            found: BTreeSet::new(),
             reaching: of_contacts(plan).map(|index| reaches(plan, index, &trunk)).collect(),
             full,
             output,
             options,
             contacts: full.contacts(),
-            trunk: trunk.clone(),
+            trunk,
             root,
             branches,
         };
-        let flight = vec![0; tracing.limbs.len()];
+        let count = tracing.limbs.len();
+        let flight = vec![0; count];
         tracing.trace(&flight, false)?;
         tracing.flight = graph.len();
-        let alone: Vec<(usize, usize)> =
-            tracing.limbs.iter().enumerate().flat_map(|(g, limb)| (1..limb.modes.len()).map(move |m| (g, m))).collect();
-        let set = |(g, m): (usize, usize)| {
-            let mut set = flight.clone();
-            set[g] = m;
-            set
-        };
+        let modes = |(g, limb): (usize, &Limb)| (1..limb.modes.len()).map(move |m| (g, m));
+        let alone: Vec<(usize, usize)> = tracing.limbs.iter().enumerate().flat_map(modes).collect();
         for &one in &alone {
-            let traced = tracing.trace(&set(one), false)?;
+            let traced = tracing.trace(&only(count, one), false)?;
             let mut all = BTreeSet::new();
-            reach(graph, &traced.results, &mut all);
+            reach(graph, traced.results.iter().filter_map(|e| e.node().map(|(id, _)| id)), &mut all);
             all.retain(|id| *id as usize >= tracing.flight && !matches!(graph.get(*id).0, Op::Input(_)));
             tracing.members.insert(one, all);
         }
@@ -214,13 +147,12 @@ impl<'g, 'a> Tracing<'g, 'a> {
         loop {
             tracing.trace(&flight, true)?;
             for &one in &alone {
-                tracing.trace(&set(one), true)?;
+                tracing.trace(&only(count, one), true)?;
             }
-            if tracing.found.is_subset(&tracing.of_limb) && tracing.found_of_trunk.is_subset(&tracing.always) {
+            if tracing.found.is_subset(&tracing.always) {
                 break;
             }
-            tracing.of_limb.extend(tracing.found.iter().copied());
-            tracing.always.extend(tracing.found_of_trunk.iter().copied());
+            tracing.always.extend(tracing.found.iter().copied());
         }
         tracing.handed.clear();
         tracing.returned.clear();
@@ -243,7 +175,7 @@ impl<'g, 'a> Tracing<'g, 'a> {
         (input as usize).checked_sub(self.first).map(|k| self.symbols[k])
     }
 
-    fn symbol_for(&mut self, symbol: Symbol) -> Expr<'g> {
+    pub(super) fn symbol_for(&mut self, symbol: Symbol) -> Expr<'g> {
         let next = self.symbols.len();
         let number = *self.numbers.entry(symbol).or_insert(next);
         if number == next {
@@ -253,7 +185,7 @@ impl<'g, 'a> Tracing<'g, 'a> {
     }
 
     /// Which contact an unknown belongs to.
-    fn contact_of(&self, unknown: usize) -> Option<usize> {
+    pub(super) fn contact_of(&self, unknown: usize) -> Option<usize> {
         let Unknown::Row(row) = self.full.unknowns[unknown] else { return None };
         self.contacts.iter().position(|c| (c.row..c.row + c.rows()).contains(&row))
     }
@@ -312,7 +244,7 @@ impl<'g, 'a> Tracing<'g, 'a> {
     }
 
     /// Whether a node is computed before the trunk, and not in flight.
-    fn of_limbs(&mut self, id: u32) -> bool {
+    pub(super) fn of_limbs(&mut self, id: u32) -> bool {
         let input = matches!(self.graph.get(id).0, Op::Input(_));
         id as usize >= self.flight && !input && self.class(id).is_early()
     }
@@ -330,196 +262,13 @@ impl<'g, 'a> Tracing<'g, 'a> {
     }
 
     /// The symbol for a number, or its negative, that the first limb of a set hands over that computes it.
-    fn hand_over(&mut self, set: &[usize], Handed { id, neg, kind }: Handed) -> Option<Expr<'g>> {
+    pub(super) fn hand_over(&mut self, set: &[usize], Handed { id, neg, kind }: Handed) -> Option<Expr<'g>> {
         let places = self.places(set).into_iter().enumerate();
         let (place, g) =
             places.into_iter().find(|(_, g)| self.members.get(&(*g, set[*g])).is_some_and(|all| all.contains(&id)))?;
         let list = self.handed.entry((g, set[g])).or_default();
         let entry = entry_of(list, Handed { id, neg, kind });
         Some(self.symbol_for(Symbol::Handed { place, entry }))
-    }
-
-    /// Replaces a value that depends on the modes of one limb.
-    fn cut(&mut self, set: &[usize], kind: Kind, e: &mut Expr<'g>) {
-        let Expr::Node { id, neg, .. } = *e else { return };
-        if self.of_limbs(id) {
-            if let Some(symbol) = self.hand_over(set, Handed { id, neg, kind }) {
-                *e = symbol;
-            }
-        }
-    }
-
-    /// Runs the sweeps in a set of modes, with or without cuts.
-    pub fn trace(&mut self, set: &[usize], cuts: bool) -> Option<Traced<'g>> {
-        let modes = self.modes(set);
-        let plan = self.full.acting(&rows_that_act(self.full.dims.rows, &self.contacts, &modes));
-        let mut physical = plan.tree(&self.given.params);
-        physical.tolerance = Expr::Const(tolerance(self.options.precision));
-        let tree = physical.regrouped();
-        let tree = match self.output {
-            Output::Multipliers => tree.for_accelerations().clone(),
-            _ => tree,
-        };
-        let passes = OutputSweeps::of(self.output)?.all_passes(&tree);
-        let mut state = PassState::new(self.output, self.graph, tree, &passes)?;
-        let given = Rc::clone(&self.given);
-        let (mut trunk, mut multipliers) = (BTreeMap::new(), Vec::new());
-        let mut from_limbs = [BTreeMap::new(), BTreeMap::new()];
-        for (k, pass) in passes.iter().enumerate() {
-            let before: Vec<ProgramResult> = state.unknowns().map(|(_, _, e)| output(*e)).collect();
-            state.begin(k, &given);
-            let n = state.tree.nodes.len();
-            let solved = !trunk.is_empty() || !multipliers.is_empty();
-            match pass.direction {
-                SweepDirection::TipToBase => {
-                    let inward = cuts && !solved;
-                    for i in (0..n).rev() {
-                        if inward && self.root == Some(i) {
-                            state.carried(k, i, &given, |e| self.cut(set, Kind::Other, e));
-                            self.cut_running(set, k, &mut state, &given);
-                        }
-                        let parent = state.tree.nodes[i].parent.filter(|p| self.trunk[*p] && !self.trunk[i]);
-                        let Some(parent) = parent.filter(|_| cuts) else {
-                            state.node(k, i, &given);
-                            continue;
-                        };
-                        let before = read(|visit| state.carried(k, parent, &given, visit));
-                        state.carried(k, parent, &given, |e| *e = Expr::Const(0.0));
-                        state.node(k, i, &given);
-                        let mut before = before.into_iter();
-                        state.carried_by_sweeps(k, parent, &given, |value, e| {
-                            let crossing = Crossing::Carried { node: i, value };
-                            self.cut_limb(set, crossing, solved, e, &mut from_limbs[usize::from(solved)]);
-                            *e = before.next().unwrap_or(Expr::Const(0.0)) + *e;
-                        });
-                    }
-                    if inward && self.root.is_none() {
-                        self.cut_running(set, k, &mut state, &given);
-                    }
-                }
-                SweepDirection::BaseToTip => {
-                    if cuts && self.root.is_none() {
-                        self.cut_outward(set, k, &before, &mut state, &given, &mut trunk, &mut multipliers);
-                    }
-                    for i in 0..n {
-                        state.node(k, i, &given);
-                        if cuts && self.root == Some(i) {
-                            self.cut_outward(set, k, &before, &mut state, &given, &mut trunk, &mut multipliers);
-                        }
-                    }
-                }
-            }
-            state.end(k, &given);
-        }
-        let results = state.finish(&given);
-        Some(Traced { results, trunk, from_limbs, multipliers })
-    }
-
-    /// Replaces what a pass updates at every node: of all rows first their whole diagonals.
-    fn cut_running(&mut self, set: &[usize], pass: usize, state: &mut PassState<'g, '_>, given: &SymbolicInputs<'g>) {
-        let slots: Vec<usize> = (0..state.tree.unknowns.len()).filter(|g| state.tree.is_slot(*g)).collect();
-        // Rows that limbs have eliminated do not cross: they would only shift the numbers of those that do.
-        let crosses: Vec<bool> = slots.iter().map(|unknown| self.crosses(*unknown)).collect();
-        let n = slots.len();
-        let mut number = 0;
-        state.running(pass, given, |e| {
-            let (crossing, kind) = match number {
-                k if k < n => (crosses[k], Kind::Whole),
-                k if k < n + n * n => (crosses[(k - n) / n] && crosses[(k - n) % n], Kind::Other),
-                k => (crosses[(k - n) % n], Kind::Other),
-            };
-            if crossing {
-                self.cut(set, kind, e);
-            }
-            number += 1;
-        });
-    }
-
-    /// Whether an unknown is solved in the trunk, as far as it belongs to a contact.
-    fn crosses(&self, unknown: usize) -> bool {
-        self.contact_of(unknown).is_none_or(|contact| self.reaching[contact])
-    }
-
-    /// Replaces what a limb hands to the trunk where that depends on the modes of the limb.
-    fn cut_limb(
-        &mut self,
-        set: &[usize],
-        crossing: Crossing,
-        solved: bool,
-        e: &mut Expr<'g>,
-        from_limbs: &mut BTreeMap<Crossing, Expr<'g>>,
-    ) {
-        let value = output(*e);
-        if set.iter().all(|m| *m == 0) {
-            self.in_flight.insert(crossing, value);
-        }
-        if self.in_flight.get(&crossing).is_some_and(|other| *other != value) {
-            self.found.insert(crossing);
-        }
-        if self.of_limb.contains(&crossing) {
-            from_limbs.insert(crossing, *e);
-            *e = self.symbol_for(if solved { Symbol::BackFromLimb(crossing) } else { Symbol::FromLimb(crossing) });
-        } else if !solved {
-            self.cut(set, Kind::Other, e);
-        }
-    }
-
-    /// After the trunk: its motion, and the multipliers that differ from what they were `before` the pass.
-    fn cut_outward(
-        &mut self,
-        set: &[usize],
-        pass: usize,
-        before: &[ProgramResult],
-        state: &mut PassState<'g, '_>,
-        given: &SymbolicInputs<'g>,
-        trunk: &mut BTreeMap<Crossing, Expr<'g>>,
-        multipliers: &mut Vec<(usize, usize, Expr<'g>)>,
-    ) {
-        for node in (0..self.trunk.len()).filter(|i| self.trunk[*i]).collect::<Vec<_>>() {
-            state.carried_by_sweeps(pass, node, given, |value, e| {
-                self.cut_trunk(set, Crossing::Carried { node, value }, e, trunk);
-            });
-        }
-        let all: Vec<(usize, usize, Expr<'g>)> = state.unknowns().map(|(level, g, e)| (level, g, *e)).collect();
-        let mut new = Vec::new();
-        for ((level, unknown, mut e), before) in all.into_iter().zip(before) {
-            if output(e) != *before {
-                match self.limb_of(unknown) {
-                    None => self.cut_trunk(set, Crossing::Unknown { level, unknown }, &mut e, trunk),
-                    Some(_) => {
-                        multipliers.push((level, unknown, e));
-                        e = self.symbol_for(Symbol::Multiplier { level, unknown });
-                    }
-                }
-            }
-            new.push(e);
-        }
-        state.unknowns().zip(new).for_each(|((_, _, e), new)| *e = new);
-    }
-
-    fn cut_trunk(
-        &mut self,
-        set: &[usize],
-        crossing: Crossing,
-        e: &mut Expr<'g>,
-        trunk: &mut BTreeMap<Crossing, Expr<'g>>,
-    ) {
-        let value = output(*e);
-        if set.iter().all(|m| *m == 0) {
-            self.trunk_in_flight.insert(crossing, value);
-        }
-        // Sweeps that flight does not need hand on what is the same in all modes, before the trunk is solved.
-        let differs = match self.trunk_in_flight.get(&crossing) {
-            Some(other) => *other != value,
-            None => matches!(*e, Expr::Node { id, .. } if !self.class(id).is_early()),
-        };
-        if differs {
-            self.found_of_trunk.insert(crossing);
-        }
-        if self.always.contains(&crossing) {
-            trunk.insert(crossing, *e);
-            *e = self.symbol_for(Symbol::Trunk(crossing));
-        }
     }
 
     /// A value of the trunk in terms of what was handed to it and given back; `None`: it cannot be cut.
@@ -589,90 +338,17 @@ pub fn entry_of<T: PartialEq>(list: &mut Vec<T>, id: T) -> usize {
     })
 }
 
-/// Adds all nodes to a set that some values need.
-pub fn reach(graph: &Graph, values: &[Expr], all: &mut BTreeSet<u32>) {
-    let mut stack: Vec<u32> =
-        values.iter().filter_map(|e| if let Expr::Node { id, .. } = e { Some(*id) } else { None }).collect();
+/// Adds all nodes to a set that some nodes need, themselves included.
+pub fn reach(graph: &Graph, ends: impl IntoIterator<Item = u32>, all: &mut BTreeSet<u32>) {
+    let mut stack: Vec<u32> = ends.into_iter().collect();
     while let Some(id) = stack.pop() {
         if all.insert(id) {
-            stack.extend(
-                graph.get(id).0.operands().filter_map(|o| if let Operand::Node(k) = o { Some(k) } else { None }),
-            );
+            stack.extend(nodes(&graph.get(id).0));
         }
     }
 }
 
-/// The nodes that constraint `index` of a plan binds.
-fn members(plan: &Plan, index: usize) -> Vec<usize> {
-    match &plan.constraints[index].bond {
-        PlanBond::Cut { frames, .. } => frames.iter().filter_map(|frame| frame.node).collect(),
-        PlanBond::Coupling { terms, .. } => terms.iter().map(|(node, _)| *node).collect(),
-    }
-}
-
-/// Whether rows of a constraint are eliminated in the trunk or at the ground.
-fn reaches(plan: &Plan, index: usize, trunk: &[bool]) -> bool {
-    let inboard = plan.nodes.iter().zip(trunk).filter(|(_, trunk)| **trunk);
-    let solved =
-        inboard.flat_map(|(node, _)| node.elimination.solve_before.iter().chain(&node.elimination.solve_after));
-    let slots = &plan.constraints[index].slots;
-    solved.chain(&plan.solve_at_ground).any(|unknown| slots.contains(unknown))
-}
-
-/// Numbers of the constraints that are contacts, in the order of the contacts.
-fn of_contacts(plan: &Plan) -> std::ops::Range<usize> {
-    plan.constraints.len() - plan.model.contacts.len()..plan.constraints.len()
-}
-
-/// The nodes inboard of everything that contacts bind, and the outermost of them.
-fn trunk(plan: &Plan) -> (Vec<bool>, Option<usize>) {
-    let mut common: Option<Vec<usize>> = None;
-    for node in of_contacts(plan).flat_map(|index| members(plan, index)) {
-        let way = plan.ancestors(node);
-        common = Some(match common {
-            None => way,
-            Some(common) => common.into_iter().filter(|i| way.contains(i)).collect(),
-        });
-    }
-    let common = common.unwrap_or_default();
-    // Where there is one contact only, its own body is the outermost node of the trunk.
-    let trunk = (0..plan.nodes.len()).map(|i| common.contains(&i)).collect();
-    (trunk, common.first().copied())
-}
-
-/// Contacts by the branches of the trunk that they bind.
-fn limbs(full: &Plan, plan: &Plan, trunk: &[bool]) -> Option<(Vec<Limb>, Vec<BTreeSet<usize>>)> {
-    let mut groups: Vec<(Vec<usize>, BTreeSet<usize>)> = Vec::new();
-    for (contact, index) in of_contacts(plan).enumerate() {
-        let branch = |node: usize| plan.ancestors(node).into_iter().take_while(|i| !trunk[*i]).last();
-        let mut branches: BTreeSet<usize> = members(plan, index).into_iter().filter_map(branch).collect();
-        let mut contacts = vec![contact];
-        groups.retain(|(others, of_others)| {
-            let apart = of_others.is_disjoint(&branches);
-            if !apart {
-                contacts.extend(others);
-                branches.extend(of_others);
-            }
-            apart
-        });
-        groups.push((contacts, branches));
-    }
-    for (contacts, _) in &mut groups {
-        contacts.sort_unstable();
-    }
-    groups.sort();
-    let limb = |(contacts, branches): (Vec<usize>, BTreeSet<usize>)| {
-        let mut modes = vec![Vec::new()];
-        for &contact in &contacts {
-            let contact = &full.model.contacts[contact];
-            let each = modes_of(&contact.kind, contact.friction);
-            modes = modes.iter().flat_map(|set: &Vec<Mode>| each.iter().map(|m| [&set[..], &[*m]].concat())).collect();
-            if modes.len() > MOST_LIMB_MODES {
-                return None;
-            }
-        }
-        Some((Limb { contacts, modes }, branches))
-    };
-    let limbs = groups.into_iter().map(limb).collect::<Option<Vec<_>>>()?;
-    Some(limbs.into_iter().unzip())
+/// The set of modes of `limbs` limbs in which one of them is in its mode `m`, and all others are in flight.
+pub fn only(limbs: usize, (g, m): (usize, usize)) -> Vec<usize> {
+    (0..limbs).map(|k| if k == g { m } else { 0 }).collect()
 }
