@@ -2,21 +2,13 @@
 
 use mbd_codegen::model::Model;
 
-use super::known::random;
+use super::known::{random, CASE};
 use super::scene::{model, Scene};
 
 /// A free body with a shape on a floor.
 fn thrown(shape: &str, friction: f64, restitution: f64) -> Model {
     model(&format!(
-        r#"
-[[body]]
-name = "case"
-mass = 2.0
-inertia = [0.02, 0.03, 0.04]
-[[joint]]
-name = "case"
-type = "floating"
-child = "case"
+        r#"{CASE}
 [[shape]]
 name = "floor"
 type = "plane"

@@ -148,11 +148,8 @@ fn a_block_that_slides_up_an_incline_comes_back() {
     assert_eq!(scene.system.modes(), [Mode::Slide; 2]);
 }
 
-/// A free box with eight corners on the floor.
-pub(super) fn free_box(friction: f64, restitution: f64) -> Model {
-    let mut model = model(
-        r#"
-name = "case"
+/// A free body.
+pub(super) const CASE: &str = r#"
 [[body]]
 name = "case"
 mass = 2.0
@@ -160,10 +157,12 @@ inertia = [0.02, 0.03, 0.04]
 [[joint]]
 name = "case"
 type = "floating"
-parent = "ground"
 child = "case"
-"#,
-    );
+"#;
+
+/// A free box with eight corners on the floor.
+pub(super) fn free_box(friction: f64, restitution: f64) -> Model {
+    let mut model = model(CASE);
     for k in 0..8 {
         let side = |bit: u32, size: f64| if k >> bit & 1 == 0 { -size } else { size };
         let corner = [side(0, 0.2), side(1, 0.15), side(2, 0.1)];
