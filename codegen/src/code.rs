@@ -47,6 +47,12 @@ impl Code {
         self.blocks().into_iter().flat_map(|program| program.steps.iter().map(|(_, op, _)| op))
     }
 
+    /// Whether an operation reads a table.
+    #[cfg(feature = "jit")]
+    pub fn looks_up(&self) -> bool {
+        self.operations().any(|op| matches!(op, Op::LookUp(_)))
+    }
+
     /// Bits of the constants that operations have.
     pub fn constants(&self) -> BTreeSet<u64> {
         let bits = |o| if let Operand::Const(bits) = o { Some(bits) } else { None };

@@ -10,6 +10,8 @@ mod emit;
 mod error;
 pub mod factored;
 pub mod generate;
+#[cfg(feature = "height_fields")]
+mod field;
 #[cfg(feature = "hulls")]
 mod hull;
 pub mod identifiable;

@@ -83,6 +83,10 @@ impl<S: Scalar> Scalar for Dual<S> {
         Dual::new(re, -(re * re * self.du))
     }
 
+    fn look_up(self, table: &'static [f64], offset: usize) -> Self {
+        Dual::new(self.re.look_up(table, offset), S::zero())
+    }
+
     fn node(self) -> Option<(u32, bool)> {
         self.re.node()
     }

@@ -227,6 +227,18 @@ impl Scalar for Interval {
         let above = Interval { low: self.low.max(floor.low), high: self.high };
         (Interval::one() / above).hull(Interval::zero())
     }
+
+    /// Encloses all entries from that of one end to that of the other.
+    fn look_up(self, table: &'static [f64], offset: usize) -> Self {
+        let last = table.len().saturating_sub(1);
+        let number = |x: f64| (x as usize).saturating_add(offset).min(last);
+        let range = match self.is_bounded() {
+            true => number(self.low)..=number(self.high),
+            false => offset.min(last)..=last,
+        };
+        let entries = table.get(range).unwrap_or(&[]).iter().map(|x| Interval::point(*x));
+        entries.reduce(Interval::hull).unwrap_or(Interval::zero())
+    }
 }
 
 impl Dual<Interval> {

@@ -21,6 +21,7 @@ pub mod constrained;
 pub mod contact;
 mod dual;
 mod error;
+pub mod field;
 pub mod integrate;
 #[cfg(feature = "alloc")]
 pub mod interp;

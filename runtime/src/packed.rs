@@ -71,6 +71,10 @@ impl<const L: usize> Scalar for Packed<L> {
     fn reciprocal_above(self, floor: Self) -> Self {
         self.with(floor, Scalar::reciprocal_above)
     }
+    #[inline]
+    fn look_up(self, table: &'static [f64], offset: usize) -> Self {
+        Packed(self.0.map(|x| x.look_up(table, offset)))
+    }
 }
 
 impl<const L: usize> Real for Packed<L> {

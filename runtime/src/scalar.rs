@@ -24,6 +24,10 @@ pub trait Scalar:
     /// redundant. Zero leaves the row out, where too little of its diagonal entry remains. `floor` must not be
     /// negative. If `self` is NaN, so is the result.
     fn reciprocal_above(self, floor: Self) -> Self;
+    /// The entry of a table: that with the number of the largest whole number up to `self`, plus `offset`. Below the first
+    /// entry it is the first one plus `offset`, behind the last one it is the last one, and for NaN the first one. It is
+    /// constant between whole numbers, so that its derivative is zero.
+    fn look_up(self, table: &'static [f64], offset: usize) -> Self;
     /// Fraction of the diagonal entries of the rows of a constraint: where less than this fraction remains of one row
     /// after the rows before it have been eliminated, the row is left out. At a distance `s` from a position where a
     /// row becomes dependent, `s²` remains of it; an error `φ` of the positions rotates the direction of motion there
@@ -49,6 +53,14 @@ pub trait Scalar:
     fn one() -> Self {
         Self::constant(1.0)
     }
+}
+
+/// [`Scalar::look_up`] for a double; 0 where the table is empty.
+#[inline]
+fn entry(x: f64, table: &[f64], offset: usize) -> f64 {
+    // The conversion is to zero where `x` is negative or NaN.
+    let k = (x as usize).saturating_add(offset).min(table.len().saturating_sub(1));
+    table.get(k).copied().unwrap_or(0.0)
 }
 
 impl Scalar for f64 {
@@ -82,6 +94,10 @@ impl Scalar for f64 {
         } else {
             reciprocal
         }
+    }
+    #[inline]
+    fn look_up(self, table: &'static [f64], offset: usize) -> Self {
+        entry(self, table, offset)
     }
 }
 
@@ -118,6 +134,10 @@ impl Scalar for f32 {
         }
     }
     #[inline]
+    fn look_up(self, table: &'static [f64], offset: usize) -> Self {
+        entry(f64::from(self), table, offset) as f32
+    }
+    #[inline]
     fn rank_tolerance() -> Self {
         1e-5
     }
@@ -134,6 +154,17 @@ impl Constant {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn entries_of_tables() {
+        static TABLE: [f64; 4] = [10.0, 11.0, 12.0, 13.5];
+        let at = |x: f64, offset| x.look_up(&TABLE, offset);
+        assert_eq!([-1e300, -0.5, 0.0, 0.99, 1.0, 3.7, 4.0, 1e300].map(|x| at(x, 0)), [
+            10.0, 10.0, 10.0, 10.0, 11.0, 13.5, 13.5, 13.5
+        ]);
+        assert_eq!([-3.0, 1.5, 2.0, f64::INFINITY].map(|x| at(x, 1)), [11.0, 12.0, 13.5, 13.5]);
+        assert_eq!((at(f64::NAN, 0), 1.5_f32.look_up(&TABLE, 9), 2.0.look_up(&[], 0)), (10.0, 13.5, 0.0));
+    }
 
     #[test]
     fn reciprocal_above_floor() {

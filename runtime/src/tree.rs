@@ -11,6 +11,7 @@ mod unrolled;
 
 use alloc::vec::Vec;
 
+use crate::field::Field;
 use crate::spatial::{ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::Scalar;
 
@@ -314,6 +315,14 @@ pub enum Closure<S> {
         length: S,
         /// Radii of the cylinder and the ball, m.
         radii: [S; 2],
+    },
+    /// A ball about the second origin, or that point, rolls on a height field in the axes of the first frame. It is computed
+    /// with feature `height_fields`.
+    RollingBallOnField {
+        /// The field.
+        field: &'static Field,
+        /// Radius of the ball, m; none for a point.
+        radius: Option<S>,
     },
     /// No velocity of the second origin along z of the second frame.
     KnifeEdge,

@@ -81,6 +81,10 @@ impl<const COARSE: bool> Scalar for Wide<COARSE> {
             Self::one() / self
         }
     }
+    // A number that is a whole one but for digits of its second part may count as that one.
+    fn look_up(self, table: &'static [f64], offset: usize) -> Self {
+        Self::constant(self.0.hi().look_up(table, offset))
+    }
 }
 
 impl<const COARSE: bool> Real for Wide<COARSE> {

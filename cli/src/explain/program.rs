@@ -65,6 +65,10 @@ pub fn statements(plan: &Plan, group: &OutputProgram<Program>, out: &mut dyn Wri
                 let (value, floor) = (operand(&p.value), operand(&p.floor));
                 format!("1 / {}{value} above {}{floor}", minus(p.minus_value), minus(p.minus_floor))
             }
+            Op::LookUp(look) => {
+                let (sign, n) = (if look.minus { "-" } else { "" }, look.table.0.len());
+                format!("entry {sign}{} + {} of {n} numbers", name(look.at), look.offset)
+            }
             Op::Sqrt(a) => format!("sqrt({})", name(*a)),
             Op::Sin(a) => format!("sin({})", name(*a)),
             Op::Cos(a) => format!("cos({})", name(*a)),

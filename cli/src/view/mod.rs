@@ -87,6 +87,10 @@ impl Given {
             let help = "convert the model with these options first: `mbd convert MODEL --gravity .. -o model.toml`";
             return Err(Failure::new("the page takes neither --gravity nor --base planar", help));
         }
+        if model.shapes.iter().any(|shape| matches!(shape.kind, ShapeKind::HeightField { .. })) {
+            let help = "remove the shape and its contacts; `mbd simulate --picture` draws height fields";
+            return Err(Failure::new("the page has no height fields", help));
+        }
         let mut name = file_name(path);
         let mut files = included.into_inner();
         // The page makes no hulls: it is given their corners.

@@ -126,6 +126,8 @@ pub(super) fn between(
                 unsupported(&pair, [first, second], findings);
                 Vec::new()
             }));
+            #[cfg(feature = "height_fields")]
+            tight([first, second], &pair, findings);
             if catches([first, second]) {
                 let what = format!("contact {}", quote(&pair.name.value));
                 let message = format!("{what}: a point is caught by an edge that it slides over");
@@ -227,7 +229,10 @@ impl Pair {
 fn unsupported(pair: &Pair, [a, b]: [&Shape; 2], findings: &mut Findings) {
     let what = format!("contact {}", quote(&pair.name.value));
     let message = format!("{what}: {} and {} cannot touch", with_article(a.kind.word()), with_article(b.kind.word()));
-    let simple = |s: &Shape| matches!(s.kind, ShapeKind::Plane { .. } | ShapeKind::Point);
+    let simple = |s: &Shape| {
+        matches!(s.kind, ShapeKind::Plane { .. } | ShapeKind::Point)
+            || matches!((&a.kind, &b.kind), (ShapeKind::HeightField { .. }, ShapeKind::HeightField { .. }))
+    };
     let help = match simple(a) || simple(b) {
         true => SUPPORTED.into(),
         false => format!("{SUPPORTED}; describe one of the two by spheres or points"),
@@ -259,7 +264,11 @@ fn all(
                 caught.push(pair.name.value.clone());
             }
             match pair.contacts([a, b], findings) {
-                Some(found) => contacts.extend(found),
+                Some(found) => {
+                    #[cfg(feature = "height_fields")]
+                    tight([a, b], &pair, findings);
+                    contacts.extend(found);
+                }
                 None => left_out.push(pair.name.value),
             }
         }
@@ -274,6 +283,34 @@ fn all(
         findings.warning(span, format!("points are caught by edges that they slide over: {names}"), SMALL);
     }
     contacts
+}
+
+/// Reports a ball that does not fit into every hollow of a height field.
+#[cfg(feature = "height_fields")]
+fn tight([a, b]: [&Shape; 2], pair: &Pair, findings: &mut Findings) {
+    use crate::field::{narrow, Narrow};
+    let (field, ball, ground, radius) = match (&a.kind, &b.kind) {
+        (ShapeKind::HeightField { field }, ShapeKind::Sphere { radius } | ShapeKind::Capsule { radius, .. }) => {
+            (field, b, a, *radius)
+        }
+        (ShapeKind::Sphere { radius } | ShapeKind::Capsule { radius, .. }, ShapeKind::HeightField { field }) => {
+            (field, a, b, *radius)
+        }
+        _ => return,
+    };
+    if !(radius > 0.0) {
+        return;
+    }
+    if let Some(Narrow { at: [x, y, _], radius: hollow }) = narrow(field, radius) {
+        let (what, ground, ball) = (quote(&pair.name.value), quote(&ground.name), quote(&ball.name));
+        let why = match hollow < 10.0 * radius {
+            true => format!("its hollow at x = {x:.4}, y = {y:.4} has a radius of {hollow:.3} m"),
+            false => format!("it bends too much within {radius} m of x = {x:.4}, y = {y:.4}"),
+        };
+        let message = format!("contact {what}: {ball}, of radius {radius} m, cannot follow {ground}: {why}");
+        let help = "make the ball smaller than all hollows, a `point` where need be, or the ground smoother";
+        findings.error(pair.at, message, help);
+    }
 }
 
 /// What to do about points at edges.

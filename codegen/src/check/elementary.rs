@@ -1,12 +1,15 @@
 //! The one table of the pairs of shapes that can touch.
 
+use mbd_runtime::field::Field;
+
 use crate::inertia::{apply, matrix};
 use crate::model::{LoopKind, Mount, Placement, ShapeKind, Value};
 
 /// What [`elementary`] has, for messages.
 pub(super) const SUPPORTED: &str =
-    "a `plane` can touch shapes of every other kind, a `sphere` or `point` those but an \
-     `ellipsoid` or a `hull`, a `sphere` or `capsule` also one of its own";
+    "a `plane` can touch shapes of every other kind but a `height_field`, which can touch those but a `cylinder` and an \
+     `ellipsoid`; a `sphere` or `point` can touch all but an `ellipsoid` or a `hull`, a `sphere` or `capsule` also one of \
+     its own";
 
 /// One place where two shapes can touch: a loop between two frames, which stand at these origins in the axes of the
 /// shapes, not turned.
@@ -44,6 +47,19 @@ pub(super) fn elementary(first: &ShapeKind, second: &ShapeKind) -> Option<Vec<El
         (ShapeKind::Plane { normal }, ShapeKind::Ellipsoid { semi_axes }) => {
             vec![middles(LoopKind::RollingEllipsoid { normal: *normal, semi_axes: semi_axes.map(Value::Const) })]
         }
+        (ShapeKind::HeightField { field }, ShapeKind::Capsule { radius, length }) => {
+            ends(*length).into_iter().map(|at| on_field(field, Some(*radius), at)).collect()
+        }
+        (ShapeKind::HeightField { field }, ShapeKind::Box { size }) => {
+            corners(*size).into_iter().map(|at| on_field(field, None, at)).collect()
+        }
+        (ShapeKind::HeightField { field }, ShapeKind::Hull { points }) => {
+            points.iter().map(|at| on_field(field, None, *at)).collect()
+        }
+        (ShapeKind::HeightField { field }, ShapeKind::Sphere { radius }) => {
+            vec![on_field(field, Some(*radius), MIDDLE)]
+        }
+        (ShapeKind::HeightField { field }, ShapeKind::Point) => vec![on_field(field, None, MIDDLE)],
         (ShapeKind::Sphere { radius: first }, second) => vec![balls(*first, ball_of(second)?)],
         (ShapeKind::Capsule { radius: first, length }, ShapeKind::Capsule { radius: second, length: other }) => {
             vec![capsules([*length, *other], [*first, *second])]
@@ -77,6 +93,11 @@ fn ball_of(shape: &ShapeKind) -> Option<f64> {
 fn ball(normal: [f64; 3], radius: f64, second: [f64; 3]) -> Elementary {
     let kind = LoopKind::RollingBall { normal, radius: Value::Const(radius) };
     Elementary { kind, first: MIDDLE, second }
+}
+
+/// A ball about a place of the second shape, or that place, on the height field of the first.
+fn on_field(field: &'static Field, radius: Option<f64>, second: [f64; 3]) -> Elementary {
+    Elementary { kind: LoopKind::RollingBallOnField { field, radius: radius.map(Value::Const) }, first: MIDDLE, second }
 }
 
 /// A ball about the middle of the second shape on one about the middle of the first.
@@ -162,6 +183,7 @@ mod tests {
     }
 
     /// What the messages say about pairs is what there is.
+    #[cfg(feature = "height_fields")]
     #[test]
     fn pairs_are_those_that_messages_name() {
         let (radius, length) = (0.1, 0.4);
@@ -174,12 +196,17 @@ mod tests {
             ShapeKind::Cylinder { radius, length },
             ShapeKind::Ellipsoid { semi_axes: [0.1, 0.2, 0.3] },
             ShapeKind::Hull { points: vec![[0.0; 3], [1.0; 3]] },
+            ShapeKind::HeightField { field: crate::field::field([1.0; 2], &vec![vec![0.0; 4]; 4]) },
         ];
         for (i, a) in shapes.iter().enumerate() {
             for (j, b) in shapes.iter().enumerate() {
                 let found = elementary(a, b).or_else(|| elementary(b, a)).is_some();
                 let least = i.min(j);
-                let wanted = if i == j { i == 1 || i == 3 } else { least == 0 || (least <= 2 && i.max(j) < 6) };
+                let wanted = match i.max(j) {
+                    8 => matches!(least, 1..=4 | 7),
+                    _ if i == j => i == 1 || i == 3,
+                    most => least == 0 || (least <= 2 && most < 6),
+                };
                 assert_eq!(found, wanted, "{} and {}", a.word(), b.word());
             }
         }

@@ -33,17 +33,20 @@ fn shape(raw: &RawShape, names: &Names, numbers: &mut Numbers) -> Option<Shape> 
 /// Reports dimensions that are superfluous or missing.
 fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) {
     let word = a(spec.word());
-    let of_hull = |key: &str| raw.hull.as_ref()?.keys.iter().find(|(k, _)| *k == key).map(|(_, span)| *span);
+    let lists = [raw.hull.as_ref().map(|hull| &hull.keys), raw.field.as_ref().map(|field| &field.keys)];
+    let listed = |key: &str| lists.iter().flatten().copied().flatten().find(|(k, _)| *k == key).map(|(_, span)| *span);
     let given = [
         ("radius", raw.radius.as_ref().map(|x| x.span), "`radius = ..`, in metres"),
         ("length", raw.length.as_ref().map(|x| x.span), "`length = ..`, along its z axis in metres"),
         ("size", raw.size.as_ref().map(|x| x.span), "`size = [x, y, z]`, the lengths of its edges in metres"),
         ("semi_axes", raw.semi_axes.as_ref().map(|x| x.span), "`semi_axes = [x, y, z]`, in metres"),
         ("normal", raw.normal.as_ref().map(|x| x.span), ""),
-        ("points", of_hull("points"), ""),
-        ("file", of_hull("file"), ""),
-        ("scale", of_hull("scale"), ""),
-        ("most", of_hull("most"), ""),
+        ("points", listed("points"), ""),
+        ("file", listed("file"), ""),
+        ("scale", listed("scale"), ""),
+        ("most", listed("most"), ""),
+        ("spacing", listed("spacing"), "`spacing = [x, y]`, the distances of neighbouring heights in metres"),
+        ("heights", listed("heights"), ""),
     ];
     for (key, span, example) in given {
         match (span, spec.keys.contains(&key)) {
@@ -61,7 +64,11 @@ fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) 
             _ => {}
         }
     }
-    if spec.word() == "hull" && of_hull("points").or(of_hull("file")).is_none() {
+    if spec.word() == "height_field" && listed("heights").or(listed("file")).is_none() {
+        let help = "add `heights = [[0, 0, 0, 0], ..]`, rows along x in metres, or `file = \"heights.csv\"`";
+        numbers.findings.error(raw.name.span, format!("{what}: a height field needs `heights` or a `file`"), help);
+    }
+    if spec.word() == "hull" && listed("points").or(listed("file")).is_none() {
         let help = "add `points = [[x, y, z], ..]`, in metres, or `file = \"mesh.stl\"`, an STL or OBJ file";
         numbers.findings.error(raw.name.span, format!("{what}: a hull needs `points` or a `file`"), help);
     }
@@ -104,11 +111,37 @@ fn kind(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) -> 
             numbers.value(&RawNumber::constant(far, at), Quantity::Length, &format!("{what}: a point"));
             Some(ShapeKind::Hull { points })
         }
+        #[cfg(feature = "height_fields")]
+        "height_field" => height_field(raw, what, numbers),
         _ => {
             let normal = raw.normal.as_ref().map(|n| numbers.direction(n, &format!("{what}: `normal`")));
             Some(ShapeKind::Plane { normal: normal.unwrap_or(Some([0.0, 0.0, 1.0]))? })
         }
     }
+}
+
+/// Slopes above this one are suspicious: 84°.
+#[cfg(feature = "height_fields")]
+const STEEP: f64 = 10.0;
+
+#[cfg(feature = "height_fields")]
+fn height_field(raw: &RawShape, what: &str, numbers: &mut Numbers) -> Option<ShapeKind> {
+    let given = raw.field.as_ref()?;
+    let (spacing, heights) = (given.spacing?, given.heights.as_ref()?);
+    let place = |key: &str| given.keys.iter().find(|(k, _)| *k == key).map_or(raw.name.span, |(_, span)| *span);
+    let far = heights.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let mut length = |x: f64, at, name: &str| {
+        numbers.value(&RawNumber::constant(x, at), Quantity::Length, &format!("{what}: {name}"));
+    };
+    length(far, place("heights"), "a height");
+    spacing.iter().for_each(|x| length(*x, place("spacing"), "`spacing`"));
+    let field = crate::field::field(spacing, heights);
+    if !field.slope.is_finite() || field.slope > STEEP {
+        let message = format!("{what}: its slope comes up to {:.3}", field.slope);
+        let help = "both `spacing` and heights are in metres; `scale` is the length of the unit of a `file`";
+        numbers.findings.warning(place("spacing"), message, help);
+    }
+    Some(ShapeKind::HeightField { field })
 }
 
 const MORE: &str = "write a length in metres, greater than 0";
@@ -124,12 +157,16 @@ fn size(x: &RawNumber, key: &str, help: &str, what: &str, numbers: &mut Numbers)
     value
 }
 
-/// Corners and ends are places that are known when the code is generated; only a point, a sphere, an ellipsoid or a
-/// plane, which are their origins with a size, can be moved by a parameter.
+/// Corners and ends are places that are known when the code is generated; only a point, a sphere, an ellipsoid, a plane or a
+/// height field, which are their origins with a size, can be moved by a parameter.
 fn still(raw: &RawShape, shape: &Shape, what: &str, numbers: &mut Numbers) {
     if matches!(
         shape.kind,
-        ShapeKind::Point | ShapeKind::Sphere { .. } | ShapeKind::Plane { .. } | ShapeKind::Ellipsoid { .. }
+        ShapeKind::Point
+            | ShapeKind::Sphere { .. }
+            | ShapeKind::Plane { .. }
+            | ShapeKind::Ellipsoid { .. }
+            | ShapeKind::HeightField { .. }
     ) {
         return;
     }

@@ -73,6 +73,7 @@ pub fn source(input: &Input) -> String {
     constants::write(&mut out, &constants::constants(input), options);
     if let Some(contacts) = &contacts {
         contacts.constants(&mut out, plan);
+        constants::tables(&mut out, plan);
     }
     fields::constructor(&mut out, options, &fields, contacts.as_ref());
     let functions = functions(input, contacts.as_ref());

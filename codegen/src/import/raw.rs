@@ -332,6 +332,8 @@ pub struct RawShape {
     pub normal: Option<Spanned<[f64; 3]>>,
     /// What a hull is made of.
     pub hull: Option<RawHull>,
+    /// What a height field is made of.
+    pub field: Option<RawField>,
 }
 
 /// The corners of a hull, with the entries that they were read from.
@@ -341,6 +343,17 @@ pub struct RawHull {
     pub keys: Vec<(&'static str, Span)>,
     /// Corners, m; `None` where something was reported, or there are no points.
     pub corners: Option<Vec<[f64; 3]>>,
+}
+
+/// The heights of a field, with the entries that they were read from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawField {
+    /// The keys that stand there, with their places.
+    pub keys: Vec<(&'static str, Span)>,
+    /// Distances of neighbours along x and y, m; `None` where something was reported, or there are none.
+    pub spacing: Option<[f64; 2]>,
+    /// Rows of heights, m; `None` where something was reported, or there are none.
+    pub heights: Option<Vec<Vec<f64>>>,
 }
 
 impl RawShape {
@@ -357,6 +370,7 @@ impl RawShape {
             semi_axes: None,
             normal: None,
             hull: None,
+            field: None,
         }
     }
 }

@@ -273,6 +273,29 @@ impl Writer<'_> {
     }
 }
 
+impl Writer<'_> {
+    /// The entry of a table, which stays where it is for as long as the program runs.
+    fn entry_of(&mut self, at: Value, table: &'static [f64], offset: usize) -> Value {
+        let ins = |s: &mut Self, k: i64| s.b.ins().iconst(types::I64, k);
+        // Zero where it is negative or NaN, as in Rust.
+        let number = self.b.ins().fcvt_to_uint_sat(types::I64, at);
+        // No table is so long that the numbers of its entries need more bits.
+        let greatest = ins(self, i64::from(u32::MAX));
+        let number = self.b.ins().umin(number, greatest);
+        let number = self.b.ins().iadd_imm(number, offset as i64);
+        let last = ins(self, table.len().saturating_sub(1) as i64);
+        let number = self.b.ins().umin(number, last);
+        let number = self.b.ins().imul_imm(number, 8);
+        let start = ins(self, table.as_ptr() as i64);
+        let place = self.b.ins().iadd(start, number);
+        let entry = self.b.ins().load(types::F64, MemFlags::trusted(), place, 0);
+        match self.shape.precision {
+            Precision::F32 => self.b.ins().fdemote(types::F32, entry),
+            Precision::F64 => entry,
+        }
+    }
+}
+
 impl Instructions for Writer<'_> {
     type Value = Value;
     type Turn = Value;
@@ -339,6 +362,23 @@ impl Instructions for Writer<'_> {
                 let below = self.b.ins().bitcast(self.number, flags, below);
                 self.b.ins().bitselect(below, zero, reciprocal)
             }
+            Operation::LookUp { at, table, offset } => match self.number.is_vector() {
+                false => self.entry_of(at, table, offset),
+                true => {
+                    let number = self.number;
+                    let lanes = 0..number.lane_count() as u8;
+                    let places: Vec<Value> = lanes.map(|k| self.b.ins().extractlane(at, k)).collect();
+                    let mut vector = None;
+                    for (k, at) in places.into_iter().enumerate() {
+                        let entry = self.entry_of(at, table, offset);
+                        vector = Some(match vector {
+                            None => self.b.ins().splat(number, entry),
+                            Some(vector) => self.b.ins().insertlane(vector, entry, k as u8),
+                        });
+                    }
+                    vector.unwrap_or(at)
+                }
+            },
             Operation::Sqrt(a) => self.b.ins().sqrt(a),
         }
     }

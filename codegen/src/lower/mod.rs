@@ -93,6 +93,15 @@ pub enum Operation<V> {
         /// The floor.
         floor: V,
     },
+    /// An entry of a table, as [`Scalar::look_up`](mbd_runtime::Scalar::look_up) finds it.
+    LookUp {
+        /// The number of the entry.
+        at: V,
+        /// The table.
+        table: &'static [f64],
+        /// What is added to the number.
+        offset: usize,
+    },
     /// `√a`
     Sqrt(V),
 }
@@ -110,6 +119,7 @@ impl<V> Operation<V> {
             Operation::ReciprocalAbove { value, floor } => {
                 Operation::ReciprocalAbove { value: f(value), floor: f(floor) }
             }
+            Operation::LookUp { at, table, offset } => Operation::LookUp { at: f(at), table, offset },
             Operation::Sqrt(a) => Operation::Sqrt(f(a)),
         }
     }

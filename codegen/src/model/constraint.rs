@@ -3,6 +3,7 @@
 //! A new kind of loop is a variant of [`LoopKind`] with its [`LoopSpec`] in this file, and its rows in the sweeps
 //! ([`mbd_runtime::tree::Closure`]).
 
+use mbd_runtime::field::Field;
 use mbd_runtime::spatial::Axis;
 use mbd_runtime::tree::Closure;
 
@@ -135,6 +136,14 @@ pub enum LoopKind {
         /// Radii of the cylinder and the ball, m.
         radii: [Value; 2],
     },
+    /// A ball about the second frame's origin, or this point, rolls without slip on a height field in the axes of the first.
+    /// Contacts are of this kind; loops in models are not.
+    RollingBallOnField {
+        /// The field.
+        field: &'static Field,
+        /// Radius of the ball, m; none for a point.
+        radius: Option<Value>,
+    },
     /// The second origin does not move along a direction fixed in the second frame.
     KnifeEdge {
         /// Direction across the edge.
@@ -251,7 +260,11 @@ const PLAIN: LoopSpec = LoopSpec {
 
 use Stands::{InBoth, InFirst, InSecond};
 
-/// Every kind of loop, in the order of the variants of [`LoopKind`].
+/// What rolls on height fields, which is no kind of loop in models.
+static ON_FIELD: LoopSpec =
+    LoopSpec { words: Words::new("rolling_ball_on_field", &[], &[]), rows: &[M, M, M], ..PLAIN };
+
+/// Every kind of loop that models can have, in the order of the variants of [`LoopKind`].
 pub static LOOPS: [LoopSpec; 21] = [
     LoopSpec {
         directions: &[axis(InBoth)],
@@ -446,6 +459,7 @@ impl LoopKind {
             LoopKind::RollingCapsules { .. } => 16,
             LoopKind::RollingBallOnBox { .. } => 17,
             LoopKind::RollingBallOnCylinder { .. } => 18,
+            LoopKind::RollingBallOnField { .. } => return &ON_FIELD,
             LoopKind::KnifeEdge { .. } => 19,
             LoopKind::Pfaffian { .. } => 20,
         };
@@ -480,6 +494,7 @@ impl LoopKind {
             | LoopKind::Distance { .. }
             | LoopKind::RollingBalls { .. }
             | LoopKind::RollingBallOnBox { .. }
+            | LoopKind::RollingBallOnField { .. }
             | LoopKind::Pfaffian { .. } => Vec::new(),
         }
     }
@@ -497,6 +512,7 @@ impl LoopKind {
             LoopKind::RollingCapsules { lengths, radii, .. } => lengths.iter_mut().chain(radii).collect(),
             LoopKind::RollingBallOnBox { size, radius } => size.iter_mut().chain([radius]).collect(),
             LoopKind::RollingBallOnCylinder { length, radii, .. } => [length].into_iter().chain(radii).collect(),
+            LoopKind::RollingBallOnField { radius, .. } => radius.iter_mut().collect(),
             LoopKind::Pfaffian { row } => row.iter_mut().collect(),
             _ => Vec::new(),
         }
@@ -524,6 +540,7 @@ impl LoopKind {
             LoopKind::RollingCapsules { lengths, radii, .. } => Closure::RollingCapsules { lengths, radii },
             LoopKind::RollingBallOnBox { size, radius } => Closure::RollingBallOnBox { size, radius },
             LoopKind::RollingBallOnCylinder { length, radii, .. } => Closure::RollingBallOnCylinder { length, radii },
+            LoopKind::RollingBallOnField { field, radius } => Closure::RollingBallOnField { field, radius },
             LoopKind::KnifeEdge { .. } => Closure::KnifeEdge,
             LoopKind::Pfaffian { row } => Closure::Pfaffian { row },
         }

@@ -1,6 +1,7 @@
 //! Contacts of the model: pairs of places that can touch, and stops of joints; the one table of the kinds of shapes.
 
 use mbd_runtime::contact::RestitutionLaw;
+use mbd_runtime::field::Field;
 
 use super::{ConstraintKind, Mount, Origin, Words};
 
@@ -72,6 +73,11 @@ pub enum ShapeKind {
         /// Its corners, m.
         points: Vec<[f64; 3]>,
     },
+    /// Ground below a smooth surface `z = h(x, y)`.
+    HeightField {
+        /// The surface.
+        field: &'static Field,
+    },
 }
 
 /// The properties of a kind of shape.
@@ -81,12 +87,12 @@ pub struct ShapeSpec {
     /// Its words.
     pub words: Words,
     /// Keys of its dimensions: `radius`, `length`, `size`, `semi_axes` `normal`, `points`,
-    /// `file`, `scale` or `most`.
+    /// `file`, `scale`, `most`, `spacing` or `heights`.
     pub keys: &'static [&'static str],
 }
 
 /// Every kind of shape, in the order of the variants of [`ShapeKind`].
-pub static SHAPES: [ShapeSpec; 8] = [
+pub static SHAPES: &[ShapeSpec] = &[
     ShapeSpec { words: Words::new("point", &[], &["vertex", "corner"]), keys: &[] },
     ShapeSpec { words: Words::new("sphere", &[], &["ball"]), keys: &["radius"] },
     ShapeSpec { words: Words::new("capsule", &[], &["pill"]), keys: &["radius", "length"] },
@@ -97,6 +103,11 @@ pub static SHAPES: [ShapeSpec; 8] = [
     ShapeSpec {
         words: Words::new("hull", &[], &["mesh", "convex", "convex_hull", "polyhedron"]),
         keys: &["points", "file", "scale", "most"],
+    },
+    #[cfg(feature = "height_fields")]
+    ShapeSpec {
+        words: Words::new("height_field", &[], &["hfield", "heightfield", "heightmap", "terrain", "ground"]),
+        keys: &["spacing", "heights", "file", "scale"],
     },
 ];
 
@@ -119,6 +130,8 @@ impl ShapeKind {
             ShapeKind::Ellipsoid { .. } => 5,
             ShapeKind::Plane { .. } => 6,
             ShapeKind::Hull { .. } => 7,
+            // Without height fields, models have none.
+            ShapeKind::HeightField { .. } => SHAPES.len() - 1,
         };
         &SHAPES[index]
     }
@@ -144,6 +157,7 @@ pub struct Shape {
 mod tests {
     use super::*;
 
+    #[cfg(feature = "height_fields")]
     #[test]
     fn every_shape_is_listed_once_and_the_documents_have_the_same_table() {
         let (radius, length, normal) = (1.0, 2.0, [0.0, 0.0, 1.0]);
@@ -156,11 +170,12 @@ mod tests {
             ShapeKind::Ellipsoid { semi_axes: [1.0, 2.0, 3.0] },
             ShapeKind::Plane { normal },
             ShapeKind::Hull { points: vec![[0.0; 3]] },
+            ShapeKind::HeightField { field: crate::field::field([1.0; 2], &vec![vec![0.0; 4]; 4]) },
         ];
         assert_eq!(all.map(|kind| *kind.spec()), SHAPES);
         Words::assert_distinct(SHAPES.iter().map(|spec| &spec.words));
         let document = include_str!("../../../book/src/model-format.md");
-        for spec in &SHAPES {
+        for spec in SHAPES {
             let keys: Vec<String> = spec.keys.iter().map(|key| format!("`{key}`")).collect();
             let row = format!("| `{}` | {} |", spec.word(), keys.join(", ")).replace("|  |", "| |");
             assert!(document.lines().any(|line| line.starts_with(&row)), "book/src/model-format.md has no row\n{row}");

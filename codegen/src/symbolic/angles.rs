@@ -44,7 +44,10 @@ impl Angles {
         // Nodes that do not depend on inputs by sums and products only.
         let mut involved = BTreeSet::new();
         for (id, op, _) in &program.steps {
-            let functions = matches!(op, Op::Sin(_) | Op::Cos(_) | Op::Sqrt(_) | Op::Div(..) | Op::ReciprocalAbove(_));
+            let functions = matches!(
+                op,
+                Op::Sin(_) | Op::Cos(_) | Op::Sqrt(_) | Op::Div(..) | Op::ReciprocalAbove(_) | Op::LookUp(_)
+            );
             if functions || nodes(op).any(|k| involved.contains(&k)) {
                 involved.insert(*id);
             }

@@ -27,6 +27,9 @@ impl Program {
                 Op::ReciprocalAbove(p) => {
                     signed(get(p.value), p.minus_value).reciprocal_above(signed(get(p.floor), p.minus_floor))
                 }
+                Op::LookUp(look) => {
+                    signed(values[look.at as usize], look.minus).look_up(look.table.0, look.offset as usize)
+                }
                 Op::Sqrt(a) => values[a as usize].sqrt(),
                 Op::Sin(a) => values[a as usize].sin_cos().0,
                 Op::Cos(a) => values[a as usize].sin_cos().1,

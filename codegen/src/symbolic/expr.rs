@@ -35,6 +35,8 @@ pub enum Op {
     Fma(Fma),
     /// `1 / ±a` where that is above `±floor`, else zero.
     ReciprocalAbove(FlooredReciprocal),
+    /// The entry of a table.
+    LookUp(LookUp),
     /// Square root.
     Sqrt(u32),
     /// Sine.
@@ -72,6 +74,43 @@ pub struct FlooredReciprocal {
     pub minus_floor: bool,
 }
 
+/// An entry of a table; see [`Scalar::look_up`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct LookUp {
+    /// The node whose value is the number of the entry.
+    pub at: u32,
+    /// Whether it is that of the negative of this value.
+    pub minus: bool,
+    /// The table.
+    pub table: Table,
+    /// What is added to the number.
+    pub offset: u32,
+}
+
+/// A table of numbers. Tables are equal where they are the same one.
+#[derive(Clone, Copy)]
+pub struct Table(pub &'static [f64]);
+
+impl PartialEq for Table {
+    fn eq(&self, other: &Table) -> bool {
+        std::ptr::eq(self.0, other.0)
+    }
+}
+
+impl Eq for Table {}
+
+impl std::hash::Hash for Table {
+    fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
+        state.write_usize(self.0.as_ptr() as usize);
+    }
+}
+
+impl std::fmt::Debug for Table {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "table of {} numbers", self.0.len())
+    }
+}
+
 impl Op {
     /// The operands of the operation.
     pub fn operands(&self) -> impl Iterator<Item = Operand> {
@@ -80,7 +119,9 @@ impl Op {
             Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) => [Some(a), Some(b), None],
             Op::Fma(f) => [Some(f.a), Some(f.b), Some(f.c)],
             Op::ReciprocalAbove(p) => [Some(p.value), Some(p.floor), None],
-            Op::Sqrt(a) | Op::Sin(a) | Op::Cos(a) => [Some(Operand::Node(a)), None, None],
+            Op::Sqrt(a) | Op::Sin(a) | Op::Cos(a) | Op::LookUp(LookUp { at: a, .. }) => {
+                [Some(Operand::Node(a)), None, None]
+            }
         };
         all.into_iter().flatten()
     }
@@ -101,6 +142,7 @@ impl Op {
             Op::ReciprocalAbove(p) => {
                 Op::ReciprocalAbove(FlooredReciprocal { value: o(p.value), floor: o(p.floor), ..p })
             }
+            Op::LookUp(look) => Op::LookUp(LookUp { at: id(look.at), ..look }),
             Op::Sqrt(a) => Op::Sqrt(id(a)),
             Op::Sin(a) => Op::Sin(id(a)),
             Op::Cos(a) => Op::Cos(id(a)),
@@ -415,6 +457,15 @@ impl Scalar for Expr<'_> {
             }
         }
     }
+
+    fn look_up(self, table: &'static [f64], offset: usize) -> Self {
+        match self {
+            Expr::Const(x) => Expr::Const(x.look_up(table, offset)),
+            Expr::Node { graph, id: at, neg: minus } => {
+                graph.node(Op::LookUp(LookUp { at, minus, table: Table(table), offset: offset as u32 }), false)
+            }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -449,6 +500,11 @@ mod tests {
         same(c(4.0).reciprocal_above(c(1.0)), c(0.25));
         same(c(0.0).reciprocal_above(c(0.0)), c(0.0));
         same(c(0.0).reciprocal_above(x), c(0.0));
+        static TABLE: [f64; 3] = [1.0, 2.0, 4.0];
+        same(c(1.5).look_up(&TABLE, 1), c(4.0));
+        same(x.look_up(&TABLE, 1), x.look_up(&TABLE, 1));
+        assert_ne!(x.look_up(&TABLE, 1).split(), x.look_up(&TABLE, 0).split());
+        assert_ne!(x.look_up(&TABLE, 1).split(), (-x).look_up(&TABLE, 1).split());
         // The sign of the inverted value decides.
         assert_ne!((-x).reciprocal_above(y).split(), (-(x.reciprocal_above(y))).split());
         same((-x).sin_cos().0, -(x.sin_cos().0));

@@ -11,6 +11,8 @@ pub fn latency(op: &Op) -> u32 {
         Op::Div(..) => DIVISION,
         // A division and a mask.
         Op::ReciprocalAbove(_) => DIVISION + 1,
+        // A conversion, two comparisons and a load.
+        Op::LookUp(_) => 14,
         Op::Sqrt(_) => 15,
         Op::Sin(_) | Op::Cos(_) => SINE,
     }
@@ -66,6 +68,8 @@ pub fn pipe(op: &Op) -> (Pipe, u32) {
         Op::Add(..) | Op::Sub(..) => (Pipe::Add, 1),
         Op::Mul(..) | Op::Fma(_) => (Pipe::Multiply, 1),
         Op::Div(..) | Op::ReciprocalAbove(_) => (Pipe::Multiply, 5),
+        // The conversion; units that the model does not have do the rest.
+        Op::LookUp(_) => (Pipe::Add, 1),
         Op::Sqrt(_) => (Pipe::Multiply, 7),
         // Half of a pair; both together take about thirty products.
         Op::Sin(_) | Op::Cos(_) => (Pipe::Multiply, 15),

@@ -14,6 +14,6 @@ pub mod passes;
 mod program;
 
 pub use cost::{cost, Cost, BYTES};
-pub use expr::{Entry, Expr, FlooredReciprocal, Fma, Graph, Label, Name, Op, Operand};
+pub use expr::{Entry, Expr, FlooredReciprocal, Fma, Graph, Label, LookUp, Name, Op, Operand, Table};
 pub use passes::Rewrite;
 pub use program::{Counts, Program, ProgramResult};

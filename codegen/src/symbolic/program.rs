@@ -60,7 +60,8 @@ impl Counts {
 
     fn add(&mut self, op: &Op, sine_of_pair: bool) {
         match op {
-            Op::Input(_) => {}
+            // Look-ups are no operations on numbers.
+            Op::Input(_) | Op::LookUp(_) => {}
             Op::Add(..) | Op::Sub(..) => self.additions += 1,
             Op::Mul(..) => self.multiplications += 1,
             Op::Div(..) | Op::ReciprocalAbove(_) => self.divisions += 1,

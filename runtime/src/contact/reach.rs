@@ -4,6 +4,8 @@
 //! those of the joints between both bodies, each of which moves what is outboard of it. A rotation moves a point by its
 //! angular velocity times the distance of the point from a point of the axis at most, here from the origin of the node.
 //! Either of the nearest points may be taken for that, because what lies between them is along the line and turns across it.
+//! Gaps above a height field are not distances: there, what the velocities can do to the distance is made larger as much as
+//! the gap may be.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -24,7 +26,7 @@ fn length<S: Real, const N: usize>(x: [S; N]) -> f64 {
 }
 
 /// Largest distances of points of the surfaces that a contact is between from the origins of their frames, m; `None` for
-/// a plane, which has no end. `None` in place of both for constraints that are no contacts.
+/// a plane or a height field, which have no end. `None` in place of both for constraints that are no contacts.
 fn radii<S: Real>(closure: &Closure<S>) -> Option<(Option<f64>, f64)> {
     Some(match closure {
         Closure::RollingDisc { radius } | Closure::RollingBall { radius } => (None, radius.abs().to_f64()),
@@ -40,6 +42,7 @@ fn radii<S: Real>(closure: &Closure<S>) -> Option<(Option<f64>, f64)> {
         Closure::RollingBallOnCylinder { length: l, radii: [a, b] } => {
             (Some(length([S::constant(0.5) * *l, *a])), b.abs().to_f64())
         }
+        Closure::RollingBallOnField { radius, .. } => (None, radius.map_or(0.0, |r| r.abs().to_f64())),
         _ => return None,
     })
 }
@@ -125,6 +128,11 @@ impl<S: Real> Tree<S> {
                 self.slides(&cut.path_a, turns, table);
                 self.slides(&cut.path_b, turns, table);
             }
+        }
+        if let Closure::RollingBallOnField { field, .. } = cut.closure {
+            // The gap is at most the way down to the ground, which is nearer than that by the cosine of the steepest slope.
+            let steep = libm::sqrt(1.0 + field.slope * field.slope);
+            table.iter_mut().for_each(|[rate, turn, _]| (*rate, *turn) = (steep * *rate, steep * *turn));
         }
     }
 

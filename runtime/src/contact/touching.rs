@@ -7,8 +7,9 @@ use crate::Scalar;
 
 /// How fast a velocity can close the gap of a contact.
 ///
-/// The gap changes by `Σ (rate + turn · Σ slide |q|) |v|` in a second at most, with the sums over the velocities and, inside, over
-/// the coordinates that belong to them. That holds in body axes and in outer ones.
+/// A gap is closed by `Σ (rate + turn · Σ slide |q|) |v|` in a second at most, with the sums over the velocities and, inside, over
+/// the coordinates that belong to them. That holds in body axes and in outer ones. All gaps but those above height fields
+/// change by no more than that, too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reach<S> {
     /// The contact.

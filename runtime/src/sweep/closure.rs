@@ -95,7 +95,8 @@ impl<S: Copy> Closure<S> {
             | Closure::RollingBalls { .. }
             | Closure::RollingCapsules { .. }
             | Closure::RollingBallOnBox { .. }
-            | Closure::RollingBallOnCylinder { .. } => 3,
+            | Closure::RollingBallOnCylinder { .. }
+            | Closure::RollingBallOnField { .. } => 3,
             Closure::PointOnLine => 2,
             Closure::Distance { .. }
             | Closure::PointOnPlane
@@ -116,8 +117,8 @@ impl<S: Copy> Closure<S> {
     /// Whether two surfaces roll on each other without slip: the first row is their distance, the others their slip.
     pub fn rolls(&self) -> bool {
         use Closure::{
-            RollingBall, RollingBallOnBox, RollingBallOnCylinder, RollingBalls, RollingCapsules, RollingDisc,
-            RollingEllipsoid,
+            RollingBall, RollingBallOnBox, RollingBallOnCylinder, RollingBallOnField, RollingBalls, RollingCapsules,
+            RollingDisc, RollingEllipsoid,
         };
         matches!(
             self,
@@ -128,6 +129,7 @@ impl<S: Copy> Closure<S> {
                 | RollingCapsules { .. }
                 | RollingBallOnBox { .. }
                 | RollingBallOnCylinder { .. }
+                | RollingBallOnField { .. }
         )
     }
 
@@ -252,6 +254,8 @@ impl<S: Scalar> Closure<S> {
             Closure::RollingCapsules { lengths, radii } => Some(Touch::capsules(at, lengths, radii)),
             Closure::RollingBallOnBox { size, radius } => Some(Touch::ball_on_box(at, size, *radius)),
             Closure::RollingBallOnCylinder { length, radii } => Some(Touch::ball_on_cylinder(at, *length, radii)),
+            #[cfg(feature = "height_fields")]
+            Closure::RollingBallOnField { field, radius } => Some(Touch::ball_on_field(at, field, *radius)),
             _ => None,
         }
     }

@@ -4,6 +4,8 @@
 //! 0 or 1 and have derivatives of zero. Distances and contact points are continuous; derivatives are those of the part
 //! that is nearest.
 
+#[cfg(feature = "height_fields")]
+use crate::field::{Field, Foot, Ground};
 use crate::spatial::{add3, dot3, scale3, Vec3};
 use crate::workspace::Relative;
 use crate::Scalar;
@@ -85,6 +87,21 @@ impl<S: Scalar> Touch<S> {
         let distance = (dot3(across, across) + S::constant(1e-36)).sqrt();
         let mantle = (distance - radii[0], scale3(S::one() / distance, across));
         Touch::ball_on_faces(&[mantle, ends(at.axis(2), at.d, length)], radii[1])
+    }
+
+    /// A ball about the origin of `B`, or this origin itself, on a height field in the axes of `A`. The gap is the way down along
+    /// z to where it touches, times the cosine of the slope there: of first order the distance, and defined however far away
+    /// the ball is.
+    #[cfg(feature = "height_fields")]
+    pub fn ball_on_field(at: &Relative<S>, field: &Field, radius: Option<S>) -> Touch<S> {
+        let [x, y, z] = core::array::from_fn(|k| dot3(at.axis(k), at.d));
+        let Foot { ground: Ground { height, slope: [p, q], .. }, cosine, off, .. } = field.under([x, y], radius);
+        let normal = at.turned([-(cosine * p), -(cosine * q), cosine]);
+        let Some(radius) = radius else { return Touch { gap: cosine * (z - height), normal, at: [S::zero(); 3] } };
+        // What is left of the way to the foot goes along the slope.
+        let beside = p * off[0] + q * off[1];
+        let gap = cosine * (z - height - radius * cosine + beside);
+        Touch { gap, normal, at: scale3(-radius, normal) }
     }
 
     /// A ball about the origin of `B` on a body that is behind all of some faces, which are at right angles to each other:

@@ -149,6 +149,9 @@ impl<S: Copy> Closure<S> {
             Closure::RollingBallOnCylinder { length, radii } => {
                 Closure::RollingBallOnCylinder { length: of(length), radii: radii.map(of) }
             }
+            Closure::RollingBallOnField { field, radius } => {
+                Closure::RollingBallOnField { field, radius: radius.map(of) }
+            }
             Closure::KnifeEdge => Closure::KnifeEdge,
             Closure::Pfaffian { row } => Closure::Pfaffian { row: row.map(of) },
         }

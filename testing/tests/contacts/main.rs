@@ -3,6 +3,7 @@
 mod answers;
 mod edges;
 mod far;
+mod fields;
 mod hulls;
 mod known;
 mod models;

@@ -77,7 +77,7 @@ impl Solid {
 
 /// The least value of a function of some numbers and where it has it, by grids that close in. `extent`: their largest
 /// absolute values. What is searched has one valley, so that no grid misses it.
-fn least<const N: usize>(extent: [f64; N], f: impl Fn(&[f64; N]) -> f64) -> ([f64; N], f64) {
+pub(super) fn least<const N: usize>(extent: [f64; N], f: impl Fn(&[f64; N]) -> f64) -> ([f64; N], f64) {
     const POINTS: usize = 9;
     let (mut best, mut value) = ([0.0; N], f(&[0.0; N]));
     let mut reach = extent;
@@ -99,7 +99,7 @@ fn least<const N: usize>(extent: [f64; N], f: impl Fn(&[f64; N]) -> f64) -> ([f6
     (best, value)
 }
 
-fn floating(name: &str) -> String {
+pub(super) fn floating(name: &str) -> String {
     format!(
         "[[body]]\nname = \"{name}\"\nmass = 0.7\ninertia = [0.01, 0.02, 0.025]\n[[joint]]\nname = \"j{name}\"\ntype = \"floating\"\nparent = \"ground\"\nchild = \"{name}\"\n"
     )
@@ -121,15 +121,15 @@ pub(super) fn back(q: &[f64], x: Vec3<f64>) -> Vec3<f64> {
 }
 
 /// A place of a body, whose coordinates are `q`, in ground axes.
-fn placed(q: &[f64], x: Vec3<f64>) -> Vec3<f64> {
+pub(super) fn placed(q: &[f64], x: Vec3<f64>) -> Vec3<f64> {
     add3([q[0], q[1], q[2]], turned(q, x))
 }
 
-fn less(a: Vec3<f64>, b: Vec3<f64>) -> Vec3<f64> {
+pub(super) fn less(a: Vec3<f64>, b: Vec3<f64>) -> Vec3<f64> {
     add3(a, scale3(-1.0, b))
 }
 
-fn norm(x: Vec3<f64>) -> f64 {
+pub(super) fn norm(x: Vec3<f64>) -> f64 {
     dot3(x, x).sqrt()
 }
 
@@ -152,7 +152,7 @@ fn nearest([a, b]: [Solid; 2], q: &[f64]) -> [Vec3<f64>; 2] {
     }
 }
 
-fn random_pose(rng: &mut Rng, spread: f64) -> Vec<f64> {
+pub(super) fn random_pose(rng: &mut Rng, spread: f64) -> Vec<f64> {
     loop {
         let x: [f64; 4] = std::array::from_fn(|_| rng.around(1.0));
         let n = x.iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -163,14 +163,14 @@ fn random_pose(rng: &mut Rng, spread: f64) -> Vec<f64> {
     }
 }
 
-struct Rows {
-    gap: f64,
-    rates: [f64; 3],
+pub(super) struct Rows {
+    pub gap: f64,
+    pub rates: [f64; 3],
     /// The normal row.
-    row: Vec<f64>,
+    pub row: Vec<f64>,
 }
 
-fn rows(scene: &mut Scene, q: &[f64], v: &[f64]) -> Rows {
+pub(super) fn rows(scene: &mut Scene, q: &[f64], v: &[f64]) -> Rows {
     let (q, v) = (q.to_vec(), v.to_vec());
     let system = scene.system.system_mut();
     let (mut gaps, mut rates, mut entries) = (system.zero_rows(), system.zero_rows(), system.zero_entries());
@@ -186,7 +186,7 @@ fn rows(scene: &mut Scene, q: &[f64], v: &[f64]) -> Rows {
 }
 
 /// Coordinates a time `h` later at constant rates.
-fn later(scene: &mut Scene, q: &[f64], v: &[f64], h: f64) -> Vec<f64> {
+pub(super) fn later(scene: &mut Scene, q: &[f64], v: &[f64], h: f64) -> Vec<f64> {
     let (q, mut qd) = (q.to_vec(), q.to_vec());
     scene.system.system_mut().coordinate_rates(&q, &v.to_vec(), &mut qd);
     q.iter().zip(&qd).map(|(q, qd)| q + h * qd).collect()

@@ -32,6 +32,10 @@ pub(super) const SHAPE: &[&str] = &[
     "file",
     "scale",
     "most",
+    #[cfg(feature = "height_fields")]
+    "spacing",
+    #[cfg(feature = "height_fields")]
+    "heights",
 ];
 pub(super) const CONTACT: &[&str] = &["name", "between", "friction", "restitution", "law"];
 pub(super) const CONTACTS: &[&str] = &["pairs", "friction", "restitution", "law"];
@@ -62,7 +66,7 @@ pub(super) fn surfaces(top: &Table, raw: &mut RawModel, findings: &mut Findings)
 
 /// What to do about shapes of other programs.
 fn special(lower: &str) -> Option<String> {
-    let help = "describe it by a few spheres, capsules or points";
+    let help = "this program was built without the feature `height_fields`";
     ["hfield", "height_field", "heightfield"].contains(&lower).then(|| help.into())
 }
 
@@ -70,7 +74,7 @@ fn shape(table: &Table, named: &Named, raw: &mut RawModel, findings: &mut Findin
     table.reject_unknown(SHAPE, "a shape", findings);
     let name = table.required_text("name", findings);
     let kind = kind(table, &SHAPES, |spec| &spec.words, special, findings);
-    let is_hull = kind.as_ref().is_some_and(|kind| kind.value.word() == "hull");
+    let word = kind.as_ref().map_or("", |kind| kind.value.word());
     let shape = RawShape {
         name: name.clone().unwrap_or(Spanned::new(String::new(), table.span)),
         body: table.text("body", findings),
@@ -81,7 +85,11 @@ fn shape(table: &Table, named: &Named, raw: &mut RawModel, findings: &mut Findin
         size: table.vec3("size", Unit::Plain, findings),
         semi_axes: table.vec3("semi_axes", Unit::Plain, findings),
         normal: table.direction("normal", findings),
-        hull: hull(table, is_hull, named, findings),
+        hull: hull(table, word == "hull", named, findings),
+        #[cfg(feature = "height_fields")]
+        field: super::heights::field(table, word == "height_field", named, findings),
+        #[cfg(not(feature = "height_fields"))]
+        field: None,
     };
     match name {
         Some(_) => raw.shapes.push(shape),
@@ -178,14 +186,14 @@ fn most(table: &Table, findings: &mut Findings) -> Option<usize> {
 }
 
 /// The factor from the unit of a mesh to metres; `None` where something was reported.
-fn scale(table: &Table, findings: &mut Findings) -> Option<f64> {
+pub(super) fn scale(table: &Table, findings: &mut Findings) -> Option<f64> {
     let Some(scale) = table.number("scale", Unit::Plain, findings) else { return Some(1.0) };
     match scale.value {
         RawValue::Const(x) if x > 0.0 => Some(x),
         RawValue::Invalid => None,
         _ => {
             let message = format!("{}`scale` is no constant greater than 0", table.prefix());
-            findings.error(scale.span, message, "write the length of the unit of the mesh in metres: 0.001 for mm");
+            findings.error(scale.span, message, "write the length of the unit of the file in metres: 0.001 for mm");
             None
         }
     }

@@ -4,6 +4,8 @@ mod base;
 mod constraints;
 mod contacts;
 mod entries;
+#[cfg(feature = "height_fields")]
+mod heights;
 mod kinds;
 mod numbers;
 mod schema;

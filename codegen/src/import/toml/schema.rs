@@ -22,6 +22,11 @@ const DEFINITIONS: &[(&str, &str)] = &[
     ("vector", r##"{ "type": "array", "items": { "$ref": "#/definitions/number" }, "minItems": 3, "maxItems": 3 }"##),
     ("direction", r#"{ "type": "array", "items": { "type": "number" }, "minItems": 3, "maxItems": 3 }"#),
     ("points", r##"{ "type": "array", "items": { "$ref": "#/definitions/direction" }, "minItems": 1 }"##),
+    #[cfg(feature = "height_fields")]
+    (
+        "rows",
+        r##"{ "type": "array", "items": { "type": "array", "items": { "type": "number" }, "minItems": 4 }, "minItems": 4 }"##,
+    ),
     ("numbers", r##"{ "type": "array", "items": { "$ref": "#/definitions/number" } }"##),
     ("freedoms", r##"{ "anyOf": [{ "$ref": "#/definitions/angle" }, { "$ref": "#/definitions/angles" }] }"##),
     ("name", r#"{ "type": "string", "minLength": 1 }"#),
@@ -126,6 +131,8 @@ fn property(table: &str, key: &str) -> String {
             format!("{{ \"type\": \"array\", \"items\": {} }}", reference(key))
         }
         (_, "points") => reference("points"),
+        (_, "heights") => reference("rows"),
+        (_, "spacing") => r#"{ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 }"#.into(),
         (_, "most") => {
             format!("{{ \"type\": \"integer\", \"minimum\": {}, \"maximum\": {} }}", hull::MOST.0, hull::MOST.1)
         }

@@ -279,6 +279,12 @@ impl Text {
             self.entry("points", bracketed(corners.iter().map(|c| bracketed(c.iter().map(|x| constant(*x))))));
             self.maybe("most", (corners.len() > hull::MOST.2).then_some(corners.len()));
         }
+        #[cfg(feature = "height_fields")]
+        if let Some(field) = &shape.field {
+            let numbers = |all: &[f64]| bracketed(all.iter().map(|x| constant(*x)));
+            self.maybe("spacing", field.spacing.map(|spacing| numbers(&spacing)));
+            self.maybe("heights", field.heights.as_ref().map(|rows| bracketed(rows.iter().map(|row| numbers(row)))));
+        }
     }
 
     fn contact(&mut self, contact: &RawContact) {

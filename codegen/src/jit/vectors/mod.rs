@@ -108,7 +108,7 @@ pub fn one_state(precision: Precision) -> Option<Width> {
 }
 
 /// Machine code of a program whose results fill arrays of the lengths `results`. `sines` is the address of the runtime's
-/// function for sines and cosines. `None` if it is too long.
+/// function for sines and cosines. `None` if it is too long or looks numbers up in tables.
 pub fn compile(
     program: &OutputProgram<Code>,
     results: &[usize],
@@ -116,6 +116,9 @@ pub fn compile(
     width: Width,
     sines: u64,
 ) -> Option<Written> {
+    if program.program.looks_up() {
+        return None;
+    }
     let branches = match &program.program {
         Code::Straight(_) => 1,
         Code::Rolled(rolled) => width.branches(rolled),

@@ -51,6 +51,9 @@ impl Scalar for Lanes {
     fn reciprocal_above(self, floor: Self) -> Self {
         Lanes(std::array::from_fn(|k| self.0[k].reciprocal_above(floor.0[k])))
     }
+    fn look_up(self, table: &'static [f64], offset: usize) -> Self {
+        Lanes(self.0.map(|x| x.look_up(table, offset)))
+    }
 }
 
 /// Results of a program.
