@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
-use mbd_runtime::field::{Field, Ground};
+use mbd_runtime::field::{Ball, Field, Ground};
 
 /// Most heights of a field.
 pub(crate) const MOST: usize = 65_536;
@@ -84,43 +84,71 @@ fn kept(table: Vec<f64>) -> &'static [f64] {
 /// A place where a ball does not follow the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Narrow {
-    /// The place on the ground in the axes of the field, m.
-    pub at: [f64; 3],
+    /// The place in the axes of the field, m.
+    pub at: [f64; 2],
     /// Least radius of curvature of the ground there where it is hollow, m; infinite where it is not.
     pub radius: f64,
 }
 
-/// The narrowest of the places at which a ball does not touch where it should: among the heights, the middles of the cells and
-/// of their edges.
-pub(crate) fn narrow(field: &Field, radius: f64) -> Option<Narrow> {
-    let mut narrowest: Option<Narrow> = None;
+/// How a ball fits on a field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Fit {
+    /// Steps with which the place is found where it touches.
+    pub steps: usize,
+    /// The narrowest of the places on the grid, and of those beside it, that are not found with as many.
+    pub narrow: [Option<Narrow>; 2],
+}
+
+/// Most steps.
+const STEPS: usize = 6;
+
+/// How near a step has to come, in units of the radius, before the last one, which squares that: the place is found to
+/// rounding errors then.
+const NEAR: f64 = 1e-6;
+
+/// Tries a ball on the heights, on the middles of the cells and of their edges, also where the ground becomes level beside the
+/// grid.
+pub(crate) fn fit(field: &'static Field, radius: f64) -> Fit {
+    static KNOWN: Mutex<Option<HashMap<(usize, u64), Fit>>> = Mutex::new(None);
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let key = (std::ptr::from_ref(field) as usize, radius.to_bits());
+    *known.get_or_insert_with(HashMap::new).entry(key).or_insert_with(|| tried(field, radius))
+}
+
+fn tried(field: &Field, radius: f64) -> Fit {
+    let mut fit = Fit { steps: 1, narrow: [None; 2] };
     let places = |k: usize| {
-        let n = 2 * field.points[k] as i64;
-        // Two cells around the grid, in which the ground becomes level.
-        (-4..n + 3).map(move |step| (0.5 * step as f64 - 0.25 * (n - 2) as f64) * field.spacing[k])
+        let last = 2 * (field.points[k] as i64 - 1);
+        (-4..=last + 4).map(move |n| (n < 0 || n > last, (0.5 * n as f64 - 0.25 * last as f64) * field.spacing[k]))
     };
-    for x in places(0) {
-        for y in places(1) {
+    for (beside_x, x) in places(0) {
+        for (beside_y, y) in places(1) {
             let ground = field.at([x, y]);
             let [p, q] = ground.slope;
             let cosine = 1.0 / (1.0 + p * p + q * q).sqrt();
-            let found = field.under([x - radius * cosine * p, y - radius * cosine * q], Some(radius));
-            let off = (found.place[0] - x).hypot(found.place[1] - y);
-            // NaN is not near.
-            if !(off <= NEAR * radius) {
-                let here = Narrow { at: [x, y, ground.height], radius: hollow(&ground, cosine) };
-                if narrowest.is_none_or(|other| here.radius < other.radius) {
-                    narrowest = Some(here);
+            let middle = [x - radius * cosine * p, y - radius * cosine * q];
+            let near = |steps: usize| {
+                let found = field.under(middle, Some(Ball { radius, steps })).place;
+                (found[0] - x).hypot(found[1] - y) <= NEAR * radius
+            };
+            // As many as were enough elsewhere, mostly.
+            if near(fit.steps - 1) {
+                continue;
+            }
+            match (fit.steps..STEPS).find(|steps| near(*steps)) {
+                Some(steps) => fit.steps = steps + 1,
+                None => {
+                    let here = Narrow { at: [x, y], radius: hollow(&ground, cosine) };
+                    let narrowest = &mut fit.narrow[usize::from(beside_x || beside_y)];
+                    if narrowest.is_none_or(|other| here.radius < other.radius) {
+                        *narrowest = Some(here);
+                    }
                 }
             }
         }
     }
-    narrowest
+    fit
 }
-
-/// How far the place where a ball touches may be off, in units of its radius. The error of the gap is of the second order of
-/// that.
-const NEAR: f64 = 1e-9;
 
 /// The smallest radius of a hollow, m.
 fn hollow(ground: &Ground<f64>, cosine: f64) -> f64 {
@@ -222,14 +250,15 @@ mod tests {
         assert_eq!(far[0], far[1]);
     }
 
-    /// In a hollow of radius 1 m, balls fit that are smaller.
+    /// In a hollow of radius 1 m, balls fit that are smaller, with more steps for larger ones.
     #[test]
     fn balls_fit_into_hollows_that_are_wider() {
-        let spacing = [0.05, 0.05];
-        let heights = rows([21, 21], spacing, |x, y| 1.0 - (1.0 - x * x - y * y).max(0.0).sqrt());
-        let bowl = field(spacing, &heights);
-        assert_eq!([0.05, 0.3, 0.6].map(|radius| narrow(bowl, radius)), [None; 3]);
-        let found = narrow(bowl, 1.1).expect("the ball is too large");
-        assert!((0.5..1.1).contains(&found.radius), "{found:?}");
+        let heights = rows([21, 21], [0.05; 2], |x, y| 1.0 - (1.0 - x * x - y * y).sqrt());
+        let bowl = field([0.05; 2], &heights);
+        let found = [0.02, 0.3, 0.6].map(|radius| fit(bowl, radius));
+        assert_eq!(found.map(|fit| fit.narrow[0]), [None; 3]);
+        assert!(found[0].steps <= 3 && found[0].steps <= found[1].steps && found[1].steps <= found[2].steps, "{found:?}");
+        let narrow = fit(bowl, 1.1).narrow[0].expect("the ball is too large");
+        assert!((0.8..1.1).contains(&narrow.radius), "{narrow:?}");
     }
 }

@@ -100,17 +100,22 @@ pub struct Foot<S> {
     pub off: [S; 2],
 }
 
-/// Steps of Newton's method in [`Field::under`]. Their error is squared by each of them; models are refused where they are
-/// too few.
-const STEPS: usize = 4;
+/// A ball on a height field.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball<S> {
+    /// Radius, m.
+    pub radius: S,
+    /// Steps of Newton's method in [`Field::under`], each of which squares the error.
+    pub steps: usize,
+}
 
 impl Field {
-    /// Where a ball touches that is let down along z with its middle over a place, m. It touches at one place where it has a
-    /// smaller radius than every hollow.
-    pub fn under<S: Scalar>(&self, middle: [S; 2], radius: Option<S>) -> Foot<S> {
-        let mut foot = self.foot(middle, middle, radius);
-        let Some(radius) = radius else { return foot };
-        for _ in 0..STEPS {
+    /// Where a ball, or a point, touches that is let down along z with its middle over a place, m. It touches at one place
+    /// where it has a smaller radius than every hollow.
+    pub fn under<S: Scalar>(&self, middle: [S; 2], ball: Option<Ball<S>>) -> Foot<S> {
+        let mut foot = self.foot(middle, middle, ball.map(|ball| ball.radius));
+        let Some(Ball { radius, steps }) = ball else { return foot };
+        for _ in 0..steps {
             let Foot { place, ground: Ground { slope: [p, q], bend: [a, b, c], .. }, cosine, off } = foot;
             // The derivative of `off` by `place`: 1 − r w (1 − w² ∇h ∇hᵀ) H.
             let along = [a * p + b * q, b * p + c * q].map(|x| cosine * cosine * x);

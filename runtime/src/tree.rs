@@ -11,7 +11,7 @@ mod unrolled;
 
 use alloc::vec::Vec;
 
-use crate::field::Field;
+use crate::field::{Ball, Field};
 use crate::spatial::{ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::Scalar;
 
@@ -321,8 +321,8 @@ pub enum Closure<S> {
     RollingBallOnField {
         /// The field.
         field: &'static Field,
-        /// Radius of the ball, m; none for a point.
-        radius: Option<S>,
+        /// The ball; none for a point.
+        ball: Option<Ball<S>>,
     },
     /// No velocity of the second origin along z of the second frame.
     KnifeEdge,

@@ -288,28 +288,39 @@ fn all(
 /// Reports a ball that does not fit into every hollow of a height field.
 #[cfg(feature = "height_fields")]
 fn tight([a, b]: [&Shape; 2], pair: &Pair, findings: &mut Findings) {
-    use crate::field::{narrow, Narrow};
+    use crate::field::fit;
     let (field, ball, ground, radius) = match (&a.kind, &b.kind) {
         (ShapeKind::HeightField { field }, ShapeKind::Sphere { radius } | ShapeKind::Capsule { radius, .. }) => {
-            (field, b, a, *radius)
+            (*field, b, a, *radius)
         }
         (ShapeKind::Sphere { radius } | ShapeKind::Capsule { radius, .. }, ShapeKind::HeightField { field }) => {
-            (field, a, b, *radius)
+            (*field, a, b, *radius)
         }
         _ => return,
     };
+    // What is not greater than zero was reported.
     if !(radius > 0.0) {
         return;
     }
-    if let Some(Narrow { at: [x, y, _], radius: hollow }) = narrow(field, radius) {
-        let (what, ground, ball) = (quote(&pair.name.value), quote(&ground.name), quote(&ball.name));
+    let (name, ball, ground) = (quote(&pair.name.value), quote(&ball.name), quote(&ground.name));
+    let message = |at: [f64; 2], hollow: f64, beside: &str| {
+        let [x, y] = at.map(|x| format!("{x:.3}").parse::<f64>().unwrap_or(x));
         let why = match hollow < 10.0 * radius {
-            true => format!("its hollow at x = {x:.4}, y = {y:.4} has a radius of {hollow:.3} m"),
-            false => format!("it bends too much within {radius} m of x = {x:.4}, y = {y:.4}"),
+            true => format!("the hollow at x = {x}, y = {y}{beside} has a radius of {hollow:.3} m"),
+            false => format!("the ground bends too sharply around x = {x}, y = {y}{beside}"),
         };
-        let message = format!("contact {what}: {ball}, of radius {radius} m, cannot follow {ground}: {why}");
-        let help = "make the ball smaller than all hollows, a `point` where need be, or the ground smoother";
-        findings.error(pair.at, message, help);
+        format!("contact {name}: {ball}, of radius {radius} m, cannot follow {ground}: {why}")
+    };
+    match fit(field, radius).narrow {
+        [Some(on), _] => {
+            let help = "make the ball smaller than all hollows or a `point`, or the ground smoother";
+            findings.error(pair.at, message(on.at, on.radius, ""), help);
+        }
+        [None, Some(beside)] => {
+            let help = "keep it on the grid, beside which the ground becomes level within two cells";
+            findings.warning(pair.at, message(beside.at, beside.radius, ", beside the grid,"), help);
+        }
+        [None, None] => {}
     }
 }
 

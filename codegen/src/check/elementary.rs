@@ -1,7 +1,10 @@
 //! The one table of the pairs of shapes that can touch.
 
-use mbd_runtime::field::Field;
+#[cfg(feature = "height_fields")]
+use mbd_runtime::field::{Ball, Field};
 
+#[cfg(feature = "height_fields")]
+use crate::field::fit;
 use crate::inertia::{apply, matrix};
 use crate::model::{LoopKind, Mount, Placement, ShapeKind, Value};
 
@@ -47,18 +50,23 @@ pub(super) fn elementary(first: &ShapeKind, second: &ShapeKind) -> Option<Vec<El
         (ShapeKind::Plane { normal }, ShapeKind::Ellipsoid { semi_axes }) => {
             vec![middles(LoopKind::RollingEllipsoid { normal: *normal, semi_axes: semi_axes.map(Value::Const) })]
         }
+        #[cfg(feature = "height_fields")]
         (ShapeKind::HeightField { field }, ShapeKind::Capsule { radius, length }) => {
             ends(*length).into_iter().map(|at| on_field(field, Some(*radius), at)).collect()
         }
+        #[cfg(feature = "height_fields")]
         (ShapeKind::HeightField { field }, ShapeKind::Box { size }) => {
             corners(*size).into_iter().map(|at| on_field(field, None, at)).collect()
         }
+        #[cfg(feature = "height_fields")]
         (ShapeKind::HeightField { field }, ShapeKind::Hull { points }) => {
             points.iter().map(|at| on_field(field, None, *at)).collect()
         }
+        #[cfg(feature = "height_fields")]
         (ShapeKind::HeightField { field }, ShapeKind::Sphere { radius }) => {
             vec![on_field(field, Some(*radius), MIDDLE)]
         }
+        #[cfg(feature = "height_fields")]
         (ShapeKind::HeightField { field }, ShapeKind::Point) => vec![on_field(field, None, MIDDLE)],
         (ShapeKind::Sphere { radius: first }, second) => vec![balls(*first, ball_of(second)?)],
         (ShapeKind::Capsule { radius: first, length }, ShapeKind::Capsule { radius: second, length: other }) => {
@@ -96,8 +104,11 @@ fn ball(normal: [f64; 3], radius: f64, second: [f64; 3]) -> Elementary {
 }
 
 /// A ball about a place of the second shape, or that place, on the height field of the first.
+#[cfg(feature = "height_fields")]
 fn on_field(field: &'static Field, radius: Option<f64>, second: [f64; 3]) -> Elementary {
-    Elementary { kind: LoopKind::RollingBallOnField { field, radius: radius.map(Value::Const) }, first: MIDDLE, second }
+    let ball = |radius: f64| Ball { radius: Value::Const(radius), steps: fit(field, radius).steps };
+    let ball = radius.filter(|radius| *radius > 0.0).map(ball);
+    Elementary { kind: LoopKind::RollingBallOnField { field, ball }, first: MIDDLE, second }
 }
 
 /// A ball about the middle of the second shape on one about the middle of the first.

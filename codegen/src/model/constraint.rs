@@ -3,7 +3,7 @@
 //! A new kind of loop is a variant of [`LoopKind`] with its [`LoopSpec`] in this file, and its rows in the sweeps
 //! ([`mbd_runtime::tree::Closure`]).
 
-use mbd_runtime::field::Field;
+use mbd_runtime::field::{Ball, Field};
 use mbd_runtime::spatial::Axis;
 use mbd_runtime::tree::Closure;
 
@@ -141,8 +141,8 @@ pub enum LoopKind {
     RollingBallOnField {
         /// The field.
         field: &'static Field,
-        /// Radius of the ball, m; none for a point.
-        radius: Option<Value>,
+        /// The ball; none for a point.
+        ball: Option<Ball<Value>>,
     },
     /// The second origin does not move along a direction fixed in the second frame.
     KnifeEdge {
@@ -512,7 +512,7 @@ impl LoopKind {
             LoopKind::RollingCapsules { lengths, radii, .. } => lengths.iter_mut().chain(radii).collect(),
             LoopKind::RollingBallOnBox { size, radius } => size.iter_mut().chain([radius]).collect(),
             LoopKind::RollingBallOnCylinder { length, radii, .. } => [length].into_iter().chain(radii).collect(),
-            LoopKind::RollingBallOnField { radius, .. } => radius.iter_mut().collect(),
+            LoopKind::RollingBallOnField { ball, .. } => ball.iter_mut().map(|ball| &mut ball.radius).collect(),
             LoopKind::Pfaffian { row } => row.iter_mut().collect(),
             _ => Vec::new(),
         }
@@ -540,7 +540,7 @@ impl LoopKind {
             LoopKind::RollingCapsules { lengths, radii, .. } => Closure::RollingCapsules { lengths, radii },
             LoopKind::RollingBallOnBox { size, radius } => Closure::RollingBallOnBox { size, radius },
             LoopKind::RollingBallOnCylinder { length, radii, .. } => Closure::RollingBallOnCylinder { length, radii },
-            LoopKind::RollingBallOnField { field, radius } => Closure::RollingBallOnField { field, radius },
+            LoopKind::RollingBallOnField { field, ball } => Closure::RollingBallOnField { field, ball },
             LoopKind::KnifeEdge { .. } => Closure::KnifeEdge,
             LoopKind::Pfaffian { row } => Closure::Pfaffian { row },
         }

@@ -42,7 +42,7 @@ fn radii<S: Real>(closure: &Closure<S>) -> Option<(Option<f64>, f64)> {
         Closure::RollingBallOnCylinder { length: l, radii: [a, b] } => {
             (Some(length([S::constant(0.5) * *l, *a])), b.abs().to_f64())
         }
-        Closure::RollingBallOnField { radius, .. } => (None, radius.map_or(0.0, |r| r.abs().to_f64())),
+        Closure::RollingBallOnField { ball, .. } => (None, ball.map_or(0.0, |ball| ball.radius.abs().to_f64())),
         _ => return None,
     })
 }

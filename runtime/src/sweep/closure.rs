@@ -255,7 +255,7 @@ impl<S: Scalar> Closure<S> {
             Closure::RollingBallOnBox { size, radius } => Some(Touch::ball_on_box(at, size, *radius)),
             Closure::RollingBallOnCylinder { length, radii } => Some(Touch::ball_on_cylinder(at, *length, radii)),
             #[cfg(feature = "height_fields")]
-            Closure::RollingBallOnField { field, radius } => Some(Touch::ball_on_field(at, field, *radius)),
+            Closure::RollingBallOnField { field, ball } => Some(Touch::ball_on_field(at, field, *ball)),
             _ => None,
         }
     }

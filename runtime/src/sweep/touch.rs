@@ -5,7 +5,7 @@
 //! that is nearest.
 
 #[cfg(feature = "height_fields")]
-use crate::field::{Field, Foot, Ground};
+use crate::field::{Ball, Field, Foot, Ground};
 use crate::spatial::{add3, dot3, scale3, Vec3};
 use crate::workspace::Relative;
 use crate::Scalar;
@@ -93,11 +93,11 @@ impl<S: Scalar> Touch<S> {
     /// z to where it touches, times the cosine of the slope there: of first order the distance, and defined however far away
     /// the ball is.
     #[cfg(feature = "height_fields")]
-    pub fn ball_on_field(at: &Relative<S>, field: &Field, radius: Option<S>) -> Touch<S> {
+    pub fn ball_on_field(at: &Relative<S>, field: &Field, ball: Option<Ball<S>>) -> Touch<S> {
         let [x, y, z] = core::array::from_fn(|k| dot3(at.axis(k), at.d));
-        let Foot { ground: Ground { height, slope: [p, q], .. }, cosine, off, .. } = field.under([x, y], radius);
+        let Foot { ground: Ground { height, slope: [p, q], .. }, cosine, off, .. } = field.under([x, y], ball);
         let normal = at.turned([-(cosine * p), -(cosine * q), cosine]);
-        let Some(radius) = radius else { return Touch { gap: cosine * (z - height), normal, at: [S::zero(); 3] } };
+        let Some(Ball { radius, .. }) = ball else { return Touch { gap: cosine * (z - height), normal, at: [S::zero(); 3] } };
         // What is left of the way to the foot goes along the slope.
         let beside = p * off[0] + q * off[1];
         let gap = cosine * (z - height - radius * cosine + beside);

@@ -3,6 +3,7 @@
 use alloc::boxed::Box;
 
 use super::{Bond, Closure, Constraint, Cut, Kind, Node, Passive, Tree, TreeFrame, TreeWrench};
+use crate::field::Ball;
 use crate::spatial::{ElementaryTransform, RigidInertia};
 use crate::Scalar;
 
@@ -149,9 +150,10 @@ impl<S: Copy> Closure<S> {
             Closure::RollingBallOnCylinder { length, radii } => {
                 Closure::RollingBallOnCylinder { length: of(length), radii: radii.map(of) }
             }
-            Closure::RollingBallOnField { field, radius } => {
-                Closure::RollingBallOnField { field, radius: radius.map(of) }
-            }
+            Closure::RollingBallOnField { field, ball } => Closure::RollingBallOnField {
+                field,
+                ball: ball.map(|Ball { radius, steps }| Ball { radius: of(radius), steps }),
+            },
             Closure::KnifeEdge => Closure::KnifeEdge,
             Closure::Pfaffian { row } => Closure::Pfaffian { row: row.map(of) },
         }
