@@ -188,10 +188,7 @@ mod tests {
                 };
                 let (x, y) = (place(0, 1), place(1, 37));
                 let got = field.at([x, y]);
-                let slope = [
-                    0.2 + 2.0 * x * y - 1.5 * x * x + 0.7 * y * y * y,
-                    -0.4 + x * x + 2.1 * x * y * y,
-                ];
+                let slope = [0.2 + 2.0 * x * y - 1.5 * x * x + 0.7 * y * y * y, -0.4 + x * x + 2.1 * x * y * y];
                 let bend = [2.0 * y - 3.0 * x, 2.0 * x + 2.1 * y * y, 4.2 * x * y];
                 // Rounding of sums of sixteen products; derivatives divide it by the spacing.
                 let size = 1.0 + field.net.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -257,7 +254,7 @@ mod tests {
         let bowl = field([0.05; 2], &heights);
         let found = [0.02, 0.3, 0.6].map(|radius| fit(bowl, radius));
         assert_eq!(found.map(|fit| fit.narrow[0]), [None; 3]);
-        assert!(found[0].steps <= 3 && found[0].steps <= found[1].steps && found[1].steps <= found[2].steps, "{found:?}");
+        assert!(found[0].steps < found[1].steps && found.iter().all(|fit| fit.steps <= STEPS), "{found:?}");
         let narrow = fit(bowl, 1.1).narrow[0].expect("the ball is too large");
         assert!((0.8..1.1).contains(&narrow.radius), "{narrow:?}");
     }

@@ -9,9 +9,9 @@ pub mod diag;
 mod emit;
 mod error;
 pub mod factored;
-pub mod generate;
 #[cfg(feature = "height_fields")]
 mod field;
+pub mod generate;
 #[cfg(feature = "hulls")]
 mod hull;
 pub mod identifiable;

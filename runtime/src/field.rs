@@ -69,9 +69,8 @@ impl Field {
         let [x, y] = core::array::from_fn(|k| splines(at[k].look_up(self.inside[k], 0) * (at[k] - cell[k])));
         let first = cell[1] * S::constant(self.width() as f64) + cell[0];
         let along = |order: usize, rows: &[[S; 4]; 4]| rows.map(|row| dot4(x[order], row));
-        let rows: [[S; 4]; 4] = core::array::from_fn(|j| {
-            core::array::from_fn(|i| first.look_up(self.net, j * self.width() + i))
-        });
+        let rows: [[S; 4]; 4] =
+            core::array::from_fn(|j| core::array::from_fn(|i| first.look_up(self.net, j * self.width() + i)));
         let [value, slope, bend] = [0, 1, 2].map(|order| along(order, &rows));
         let [dx, dy] = self.spacing;
         let part = |x: f64, sum: S| S::constant(x) * sum;

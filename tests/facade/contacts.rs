@@ -7,7 +7,7 @@ use multibody::codegen::search;
 use multibody::runtime::constrained::{close, Closing};
 use multibody::runtime::contact::{ContactEvent, ContactObserver, Hybrid, Touching, Way, WithContacts};
 use multibody::runtime::integrate::{Dop853, Step, Tolerances};
-use multibody::runtime::{Conjugate, Energetic};
+use multibody::runtime::{Conjugate, Constrained, Energetic, System};
 
 mod made {
     multibody::mbd_model! {
@@ -27,6 +27,12 @@ mod made {
     }
     multibody::mbd_model! {
         path = "models/contacts/fourbar_stop.toml", name = FourBar, modes = all, arithmetic = exact
+    }
+    multibody::mbd_model! {
+        path = "models/contacts/ball_on_hills.toml", name = OnHills, modes = all, arithmetic = exact
+    }
+    multibody::mbd_model! {
+        path = "models/contacts/ball_on_hills.toml", name = OnHillsSingle, modes = masked, scalar = f32
     }
     multibody::mbd_model! {
         path = "models/contacts/bouncing_ball.toml", name = Single, modes = all, scalar = f32
@@ -102,6 +108,24 @@ fn all_sets_of_modes() {
     let hopper = compared(made::Hopper::new(), "hopper.toml", None, &[0.0, 0.0], 2.0);
     assert_eq!(ways(&hopper), [true, false], "{:?}", hopper.steps);
     assert_eq!(made::Hopper::CONTACTS, ["landing", "leg/lower", "leg/upper"]);
+}
+
+/// Cells of height fields are looked up in tables of the generated code.
+#[test]
+fn a_height_field() {
+    let ball = compared(made::OnHills::new(), "ball_on_hills.toml", None, &[0.7, 0.4, 0.0, 0.0, 0.0, 0.0], 1.5);
+    assert_eq!(ways(&ball), [true, false], "{:?}", ball.steps);
+    // Rounded to single precision, and in other functions, the ball lands about where it does.
+    let mut single = made::OnHillsSingle::new();
+    let (mut gaps, mut rates) = (single.zero_rows(), single.zero_rows());
+    let (mut entries, v) = (single.zero_entries(), single.zero_momenta());
+    single.gaps(0.0, &made::OnHillsSingle::START, &v, &mut gaps, &mut rates, &mut entries);
+    let mut double = made::OnHills::new();
+    let (mut wanted, mut rates) = (double.zero_rows(), double.zero_rows());
+    let (mut entries, v) = (double.zero_entries(), double.zero_momenta());
+    double.gaps(0.0, &made::OnHills::START, &v, &mut wanted, &mut rates, &mut entries);
+    // A few roundings of numbers below 10.
+    assert!((f64::from(gaps[0]) - wanted[0]).abs() < 1e-5, "{gaps:?} {wanted:?}");
 }
 
 #[test]

@@ -183,7 +183,12 @@ fn sheet(plan: &Plan, scene: &Scene, drawing: &Drawing, instants: &[Instant], pa
     let extent = Page::new(seen.iter().map(|p| view.project(*p)), 0.0).size();
     // Seen from their side, supports have a size on the page, for which its edge has room.
     let pieces = if view.sees_a_plane() { Vec::new() } else { base::pieces(supports, extent, gravity(plan)) };
-    let all = seen.iter().copied().chain(corners()).chain(terrain.iter().flatten().copied()).chain(pieces.into_iter().flatten());
+    let all = seen
+        .iter()
+        .copied()
+        .chain(corners())
+        .chain(terrain.iter().flatten().copied())
+        .chain(pieces.into_iter().flatten());
     let all: Vec<[f64; 2]> = all.map(|p| view.project(p)).collect();
     let mut page = Page::new(all.iter().copied(), head);
     // Forces that are nothing but round-off are none.

@@ -183,7 +183,7 @@ impl Touch {
                     let size = sizes.fold(0.0, f64::max);
                     planes.push(Plane { frame, normal: unit(normal), patch: shape.mount.body.map(|_| size) });
                 }
-                ShapeKind::HeightField { field } => terrains.push(Terrain { frame, field }),
+                ShapeKind::HeightField { field, .. } => terrains.push(Terrain { frame, field }),
                 ref kind => {
                     let points = surface(kind);
                     if !points.is_empty() {

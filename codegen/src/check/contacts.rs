@@ -290,10 +290,10 @@ fn all(
 fn tight([a, b]: [&Shape; 2], pair: &Pair, findings: &mut Findings) {
     use crate::field::fit;
     let (field, ball, ground, radius) = match (&a.kind, &b.kind) {
-        (ShapeKind::HeightField { field }, ShapeKind::Sphere { radius } | ShapeKind::Capsule { radius, .. }) => {
+        (ShapeKind::HeightField { field, .. }, ShapeKind::Sphere { radius } | ShapeKind::Capsule { radius, .. }) => {
             (*field, b, a, *radius)
         }
-        (ShapeKind::Sphere { radius } | ShapeKind::Capsule { radius, .. }, ShapeKind::HeightField { field }) => {
+        (ShapeKind::Sphere { radius } | ShapeKind::Capsule { radius, .. }, ShapeKind::HeightField { field, .. }) => {
             (*field, a, b, *radius)
         }
         _ => return,

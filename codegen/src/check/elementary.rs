@@ -51,23 +51,23 @@ pub(super) fn elementary(first: &ShapeKind, second: &ShapeKind) -> Option<Vec<El
             vec![middles(LoopKind::RollingEllipsoid { normal: *normal, semi_axes: semi_axes.map(Value::Const) })]
         }
         #[cfg(feature = "height_fields")]
-        (ShapeKind::HeightField { field }, ShapeKind::Capsule { radius, length }) => {
+        (ShapeKind::HeightField { field, .. }, ShapeKind::Capsule { radius, length }) => {
             ends(*length).into_iter().map(|at| on_field(field, Some(*radius), at)).collect()
         }
         #[cfg(feature = "height_fields")]
-        (ShapeKind::HeightField { field }, ShapeKind::Box { size }) => {
+        (ShapeKind::HeightField { field, .. }, ShapeKind::Box { size }) => {
             corners(*size).into_iter().map(|at| on_field(field, None, at)).collect()
         }
         #[cfg(feature = "height_fields")]
-        (ShapeKind::HeightField { field }, ShapeKind::Hull { points }) => {
+        (ShapeKind::HeightField { field, .. }, ShapeKind::Hull { points }) => {
             points.iter().map(|at| on_field(field, None, *at)).collect()
         }
         #[cfg(feature = "height_fields")]
-        (ShapeKind::HeightField { field }, ShapeKind::Sphere { radius }) => {
+        (ShapeKind::HeightField { field, .. }, ShapeKind::Sphere { radius }) => {
             vec![on_field(field, Some(*radius), MIDDLE)]
         }
         #[cfg(feature = "height_fields")]
-        (ShapeKind::HeightField { field }, ShapeKind::Point) => vec![on_field(field, None, MIDDLE)],
+        (ShapeKind::HeightField { field, .. }, ShapeKind::Point) => vec![on_field(field, None, MIDDLE)],
         (ShapeKind::Sphere { radius: first }, second) => vec![balls(*first, ball_of(second)?)],
         (ShapeKind::Capsule { radius: first, length }, ShapeKind::Capsule { radius: second, length: other }) => {
             vec![capsules([*length, *other], [*first, *second])]
@@ -207,7 +207,10 @@ mod tests {
             ShapeKind::Cylinder { radius, length },
             ShapeKind::Ellipsoid { semi_axes: [0.1, 0.2, 0.3] },
             ShapeKind::Hull { points: vec![[0.0; 3], [1.0; 3]] },
-            ShapeKind::HeightField { field: crate::field::field([1.0; 2], &vec![vec![0.0; 4]; 4]) },
+            ShapeKind::HeightField {
+                field: crate::field::field([1.0; 2], &[[0.0; 4]; 4].map(Vec::from)),
+                heights: [[0.0; 4]; 4].map(Vec::from).into(),
+            },
         ];
         for (i, a) in shapes.iter().enumerate() {
             for (j, b) in shapes.iter().enumerate() {

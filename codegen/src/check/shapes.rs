@@ -77,7 +77,7 @@ fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) 
 /// A word of a shape with its article.
 pub(super) fn a(word: &str) -> String {
     let article = if word.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
-    format!("{article} {word}")
+    format!("{article} {}", word.replace('_', " "))
 }
 
 fn kind(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) -> Option<ShapeKind> {
@@ -141,7 +141,7 @@ fn height_field(raw: &RawShape, what: &str, numbers: &mut Numbers) -> Option<Sha
         let help = "both `spacing` and heights are in metres; `scale` is the length of the unit of a `file`";
         numbers.findings.warning(place("spacing"), message, help);
     }
-    Some(ShapeKind::HeightField { field })
+    Some(ShapeKind::HeightField { field, heights: heights.clone() })
 }
 
 const MORE: &str = "write a length in metres, greater than 0";

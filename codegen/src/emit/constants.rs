@@ -9,8 +9,8 @@ use mbd_runtime::tree::Source;
 use super::names::constant;
 use super::numbers::literal;
 use super::Input;
-use crate::options::Options;
 use crate::model::ShapeKind;
+use crate::options::Options;
 use crate::output::Output;
 use crate::plan::Plan;
 
@@ -153,7 +153,8 @@ pub fn write(out: &mut String, constants: &[Constant], options: &Options) {
 pub fn table(table: &[f64]) -> String {
     // The hash of Fowler, Noll and Vo of the bits.
     let bytes = table.iter().flat_map(|x| x.to_bits().to_le_bytes());
-    let hash = bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));
+    let hash =
+        bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));
     format!("TABLE_{hash:016X}")
 }
 
@@ -161,7 +162,7 @@ pub fn table(table: &[f64]) -> String {
 pub fn tables(out: &mut String, plan: &Plan) {
     let mut all = BTreeMap::new();
     for shape in &plan.model.shapes {
-        if let ShapeKind::HeightField { field } = shape.kind {
+        if let ShapeKind::HeightField { field, .. } = shape.kind {
             let tables = [field.net].into_iter().chain(field.cells).chain(field.inside);
             all.extend(tables.map(|numbers| (table(numbers), numbers)));
         }

@@ -77,6 +77,8 @@ pub enum ShapeKind {
     HeightField {
         /// The surface.
         field: &'static Field,
+        /// The heights through which it goes, in rows along x, the first one at the least y, m.
+        heights: Vec<Vec<f64>>,
     },
 }
 
@@ -170,7 +172,10 @@ mod tests {
             ShapeKind::Ellipsoid { semi_axes: [1.0, 2.0, 3.0] },
             ShapeKind::Plane { normal },
             ShapeKind::Hull { points: vec![[0.0; 3]] },
-            ShapeKind::HeightField { field: crate::field::field([1.0; 2], &vec![vec![0.0; 4]; 4]) },
+            ShapeKind::HeightField {
+                field: crate::field::field([1.0; 2], &[[0.0; 4]; 4].map(Vec::from)),
+                heights: [[0.0; 4]; 4].map(Vec::from).into(),
+            },
         ];
         assert_eq!(all.map(|kind| *kind.spec()), SHAPES);
         Words::assert_distinct(SHAPES.iter().map(|spec| &spec.words));

@@ -97,7 +97,9 @@ impl<S: Scalar> Touch<S> {
         let [x, y, z] = core::array::from_fn(|k| dot3(at.axis(k), at.d));
         let Foot { ground: Ground { height, slope: [p, q], .. }, cosine, off, .. } = field.under([x, y], ball);
         let normal = at.turned([-(cosine * p), -(cosine * q), cosine]);
-        let Some(Ball { radius, .. }) = ball else { return Touch { gap: cosine * (z - height), normal, at: [S::zero(); 3] } };
+        let Some(Ball { radius, .. }) = ball else {
+            return Touch { gap: cosine * (z - height), normal, at: [S::zero(); 3] };
+        };
         // What is left of the way to the foot goes along the slope.
         let beside = p * off[0] + q * off[1];
         let gap = cosine * (z - height - radius * cosine + beside);

@@ -26,7 +26,10 @@ impl Writer<'_> {
                 ShapeKind::Box { size } => line(out, "size", format!("{size:?}")),
                 ShapeKind::Ellipsoid { semi_axes } => line(out, "semi_axes", format!("{semi_axes:?}")),
                 ShapeKind::Plane { normal } => line(out, "normal", format!("{normal:?}")),
-                ShapeKind::HeightField { .. } => unreachable!("random mechanisms have no height fields"),
+                ShapeKind::HeightField { field, heights } => {
+                    line(out, "spacing", format!("{:?}", field.spacing));
+                    line(out, "heights", format!("{heights:?}"));
+                }
                 ShapeKind::Hull { points } => {
                     line(out, "points", format!("{points:?}"));
                     line(out, "most", format!("{}", points.len().max(4)));

@@ -1,32 +1,34 @@
 //! Contacts with height fields: gaps and rows against searches and moving points, and motions against known ones.
 
 use mbd_codegen::model::{Model, ShapeKind};
-use mbd_runtime::contact::{Mode, Touching};
+use mbd_codegen::options::{Arithmetic, Options};
+use mbd_codegen::plan::Plan;
+use mbd_runtime::contact::{Hybrid, Mode, Touching, Way, WithContacts};
 use mbd_runtime::field::Field;
+use mbd_runtime::integrate::{Dop853, Step, Tolerances};
 use mbd_runtime::spatial::{add3, cross, dot3, scale3};
+use mbd_runtime::Conjugate;
 use mbd_testing::random::Rng;
 
 use super::scene::{model, Scene};
 use super::solid::{back, floating, later, least, less, norm, placed, random_pose, rows, turned};
 
 /// A height field shape on a body, or on the ground, with heights at points that are `spacing` apart.
-fn field(body: Option<&str>, points: [usize; 2], spacing: [f64; 2], h: impl Fn(f64, f64) -> f64) -> String {
+pub(super) fn field(body: Option<&str>, points: [usize; 2], spacing: [f64; 2], h: impl Fn(f64, f64) -> f64) -> String {
     let at = |k: usize, axis: usize| (k as f64 - 0.5 * (points[axis] - 1) as f64) * spacing[axis];
     let row = |j: usize| (0..points[0]).map(|i| h(at(i, 0), at(j, 1))).collect::<Vec<f64>>();
     let rows: Vec<Vec<f64>> = (0..points[1]).map(row).collect();
     let body = body.map_or(String::new(), |body| format!("body = \"{body}\"\n"));
-    format!(
-        "[[shape]]\nname = \"hills\"\n{body}type = \"height_field\"\nspacing = {spacing:?}\nheights = {rows:?}\n"
-    )
+    format!("[[shape]]\nname = \"hills\"\n{body}type = \"height_field\"\nspacing = {spacing:?}\nheights = {rows:?}\n")
 }
 
-fn hills(x: f64, y: f64) -> f64 {
+pub(super) fn hills(x: f64, y: f64) -> f64 {
     0.1 * (2.0 * x + 0.3).sin() * (1.5 * y).cos() + 0.15 * x - 0.1 * y
 }
 
 fn of(model: &Model) -> &'static Field {
     let fields = model.shapes.iter().find_map(|shape| match shape.kind {
-        ShapeKind::HeightField { field } => Some(field),
+        ShapeKind::HeightField { field, .. } => Some(field),
         _ => None,
     });
     fields.expect("a height field")
@@ -288,4 +290,69 @@ fn a_ball_lies_in_a_hollow() {
         assert!(scene.gaps()[0].abs() < 1e-10);
     }
     assert_eq!(scene.system.modes(), [Mode::Stick]);
+}
+
+/// Coordinates and momenta of a shipped scene at its end, and its steps by what served them.
+fn end<Y>(mut mechanism: Y, plan: &Plan, time: f64) -> (Vec<f64>, Vec<f64>, [u64; 5])
+where
+    Y: Touching<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>> + Conjugate,
+{
+    let (mut q, v) = (plan.start(), plan.start_velocity().expect("it moves"));
+    let mut p = v.clone();
+    mechanism.conjugate_momenta(&q, &v, &mut p);
+    let mut system = WithContacts::new(mechanism);
+    let (method, step) = (Dop853::new(&system), Step::Adaptive(Tolerances::new(1e-9)));
+    let mut motion = Hybrid::new(&mut system, method, step, 0.0, &q, &p).unwrap();
+    motion.run(&mut system, time, &mut ()).unwrap();
+    motion.state(&system, &mut q, &mut p);
+    (q, p, motion.contact_statistics().steps)
+}
+
+/// Machine code that looks cells up has the bits of the interpreter.
+#[test]
+fn machine_code_looks_up_what_the_interpreter_does() {
+    let model = model(include_str!("../../../models/contacts/ball_on_hills.toml"));
+    let plan = Plan::new(&model, 1e-9);
+    let (q, p, _) = end(plan.default_contact_interpreter::<f64>(), &plan, 1.5);
+    let options = Options { arithmetic: Arithmetic::Exact, ..Options::default() };
+    let (other_q, other_p, steps) = end(plan.compiled_with_contacts::<f64>(&options, 10).unwrap(), &plan, 1.5);
+    assert!(steps[Way::Compiled as usize] > 10, "{steps:?}");
+    assert_eq!((other_q, other_p), (q, p));
+}
+
+/// A height that is one number of a file is the same ground as in the model.
+#[test]
+fn heights_of_a_file_are_those_of_the_model() {
+    let listed = field(None, [5, 4], [0.5, 0.25], |x, y| ((8.0 * hills(x, y)) * 1000.0).round() / 8000.0);
+    let (head, rows) = listed.split_once("heights = ").expect("heights");
+    let rows: Vec<String> = rows.trim().trim_matches(['[', ']']).split("], [").map(str::to_string).collect();
+    // In millimetres, with all kinds of separators, comments and empty lines.
+    let line = |(k, row): (usize, &String)| {
+        let numbers = row.split(", ").map(|x| format!("{}", x.parse::<f64>().expect("a number") / 0.125));
+        numbers.collect::<Vec<_>>().join([" ", ",", "; ", "\t"][k % 4])
+    };
+    let file = format!("# heights\n\n{}\n", rows.iter().enumerate().map(line).collect::<Vec<_>>().join("\n \n"));
+    let ball = body("type = \"point\"");
+    let [inside, outside] = ["", "file = \"ground.csv\"\nscale = 0.125\n"].map(|source| {
+        let ground = if source.is_empty() { listed.clone() } else { format!("{head}{source}") };
+        let text = format!("name = \"m\"\n{ball}{ground}{}", contact(""));
+        let files = |path: &std::path::Path| {
+            assert_eq!(path, std::path::Path::new("robots/ground.csv"));
+            Ok(file.clone().into_bytes())
+        };
+        let (read, findings) = mbd_codegen::read::load_with("robots/m.toml", &text, &Default::default(), &files);
+        read.unwrap_or_else(|| panic!("{findings}")).0
+    });
+    assert_eq!(of(&inside), of(&outside));
+    // What is wrong there is told with its line and column.
+    let text = format!("name = \"m\"\n{ball}{head}file = \"ground.csv\"\n{}", contact(""));
+    let wrong = |_: &std::path::Path| Ok(b"1 2 3 4\n1, two, 3, inf\n".to_vec());
+    let (read, findings) = mbd_codegen::read::load_with("robots/m.toml", &text, &Default::default(), &wrong);
+    let findings = findings.to_string();
+    assert!(read.is_none());
+    for wanted in
+        ["robots/ground.csv:2:4: error: shape `hills`: `two` is not a finite number", "ground.csv:2:12: error"]
+    {
+        assert!(findings.contains(wanted), "{findings}");
+    }
 }

@@ -16,6 +16,7 @@ use mbd_runtime::integrate::{Dop853, Step, Tolerances};
 use mbd_runtime::{Conjugate, Constrained, Dual, Real, Scalar};
 use nalgebra::{Matrix3, Vector3};
 
+use super::fields::{field, hills};
 use super::known::{ball, block};
 use super::scene::{model, Events};
 
@@ -575,4 +576,38 @@ fn the_walker_s_gaits_are_found_by_newton_s_method() {
         assert!((trace - known_trace).abs() < 1e-7, "{trace} {known_trace}");
         assert!((determinant - known_determinant).abs() < 1e-7, "{determinant} {known_determinant}");
     }
+}
+
+/// A point that is thrown on hilly ground and slides over it: place, velocity, gravity.
+struct OnHills;
+
+impl Family for OnHills {
+    fn model(&self) -> Model {
+        let ground = field(None, [12, 9], [0.3, 0.4], hills);
+        let slide = |name: &str, parent: &str, axis: &str| {
+            let mass = if name == "c" { "mass = 0.8" } else { "" };
+            format!(
+                "[[body]]\nname = \"{name}\"\n{mass}\n[[joint]]\nname = \"j{name}\"\ntype = \"prismatic\"\nparent = \"{parent}\"\n\
+                 child = \"{name}\"\naxis = {axis}\n"
+            )
+        };
+        let slides = [slide("a", "ground", "[1, 0, 0]"), slide("b", "a", "[0, 1, 0]"), slide("c", "b", "[0, 0, 1]")];
+        model(&format!(
+            "name = \"thrown\"\ngravity = [0, 0, -9.81]\n{}{ground}[[shape]]\nname = \"foot\"\nbody = \"c\"\ntype = \"point\"\n\
+             [[contact]]\nname = \"c\"\nbetween = [\"hills\", \"foot\"]\nfriction = 0.2\n",
+            slides.concat()
+        ))
+    }
+
+    fn start<S: Real>(&self, x: &[S], mechanism: &mut ContactInterpreter<S>) -> (Vec<S>, Vec<S>) {
+        mechanism.gravity[2] = -x[6];
+        (x[..3].to_vec(), x[3..6].to_vec())
+    }
+}
+
+/// Landing on a slope and sliding over the cells of the ground.
+#[test]
+fn derivatives_of_a_point_that_slides_over_hills() {
+    let causes = compare(&OnHills, &[-0.8, 0.3, 0.4, 1.5, -0.4, 0.0, 9.81], 0.7, 1e-6);
+    assert_eq!(causes, [Cause::Landed]);
 }

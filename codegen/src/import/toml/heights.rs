@@ -144,7 +144,9 @@ fn of_file(
     };
     let mut rows = Vec::new();
     let mut wrong = 0;
-    for (k, line) in text.lines().enumerate().filter(|(_, line)| !matches!(line.trim().chars().next(), None | Some('#'))) {
+    for (k, line) in
+        text.lines().enumerate().filter(|(_, line)| !matches!(line.trim().chars().next(), None | Some('#')))
+    {
         let words = line.split([',', ';', ' ', '\t', '\r']).filter(|word| !word.is_empty());
         let mut row = Vec::new();
         for word in words {
