@@ -48,7 +48,7 @@ impl Code {
     }
 
     /// Whether an operation reads a table.
-    #[cfg(feature = "jit")]
+    #[cfg(all(feature = "jit", feature = "height_fields"))]
     pub fn looks_up(&self) -> bool {
         self.operations().any(|op| matches!(op, Op::LookUp(_)))
     }

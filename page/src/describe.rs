@@ -81,7 +81,7 @@ fn shapes(scene: &Scene, colours: &[usize], frame: &dyn Fn(Option<usize>) -> Str
     let of = |x: Value| value(model, x);
     list(model.shapes.iter().filter_map(|shape| {
         let dims = match &shape.kind {
-            ShapeKind::Point | ShapeKind::HeightField { .. } => return None,
+            ShapeKind::Point => return None,
             ShapeKind::Sphere { radius } => vec![*radius],
             ShapeKind::Capsule { radius, length } | ShapeKind::Cylinder { radius, length } => vec![*radius, *length],
             ShapeKind::Box { size } => size.to_vec(),

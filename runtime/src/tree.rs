@@ -11,6 +11,7 @@ mod unrolled;
 
 use alloc::vec::Vec;
 
+#[cfg(feature = "height_fields")]
 use crate::field::{Ball, Field};
 use crate::spatial::{ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::Scalar;
@@ -316,8 +317,8 @@ pub enum Closure<S> {
         /// Radii of the cylinder and the ball, m.
         radii: [S; 2],
     },
-    /// A ball about the second origin, or that point, rolls on a height field in the axes of the first frame. It is computed
-    /// with feature `height_fields`.
+    /// A ball about the second origin, or that point, rolls on a height field in the axes of the first frame.
+    #[cfg(feature = "height_fields")]
     RollingBallOnField {
         /// The field.
         field: &'static Field,

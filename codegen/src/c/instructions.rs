@@ -209,6 +209,7 @@ impl Instructions for Writer<'_> {
             Operation::ReciprocalAbove { value, floor } => {
                 format!("{}_reciprocal_above({}, {})", prefix.lower, value.text, floor.text)
             }
+            #[cfg(feature = "height_fields")]
             Operation::LookUp { .. } => unreachable!("only contacts look numbers up, and C has none"),
             Operation::Sqrt(a) => format!("{}_SQRT({})", prefix.upper, a.text),
         };

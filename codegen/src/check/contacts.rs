@@ -229,9 +229,13 @@ impl Pair {
 fn unsupported(pair: &Pair, [a, b]: [&Shape; 2], findings: &mut Findings) {
     let what = format!("contact {}", quote(&pair.name.value));
     let message = format!("{what}: {} and {} cannot touch", with_article(a.kind.word()), with_article(b.kind.word()));
-    let simple = |s: &Shape| {
-        matches!(s.kind, ShapeKind::Plane { .. } | ShapeKind::Point)
-            || matches!((&a.kind, &b.kind), (ShapeKind::HeightField { .. }, ShapeKind::HeightField { .. }))
+    let simple = |s: &Shape| match s.kind {
+        ShapeKind::Plane { .. } | ShapeKind::Point => true,
+        #[cfg(feature = "height_fields")]
+        ShapeKind::HeightField { .. } => {
+            matches!((&a.kind, &b.kind), (ShapeKind::HeightField { .. }, ShapeKind::HeightField { .. }))
+        }
+        _ => false,
     };
     let help = match simple(a) || simple(b) {
         true => SUPPORTED.into(),

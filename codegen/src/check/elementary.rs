@@ -10,9 +10,8 @@ use crate::model::{LoopKind, Mount, Placement, ShapeKind, Value};
 
 /// What [`elementary`] has, for messages.
 pub(super) const SUPPORTED: &str =
-    "a `plane` can touch shapes of every other kind but a `height_field`, which can touch those but a `cylinder` and an \
-     `ellipsoid`; a `sphere` or `point` can touch all but an `ellipsoid` or a `hull`, a `sphere` or `capsule` also one of \
-     its own";
+    "a `plane` can touch all other kinds but a `height_field`; a `height_field` a `point`, `sphere`, `capsule`, `box` or \
+     `hull`; a `sphere` or `point` all others but an `ellipsoid` or a `hull`; a `sphere` or `capsule` also one of its own";
 
 /// One place where two shapes can touch: a loop between two frames, which stand at these origins in the axes of the
 /// shapes, not turned.

@@ -33,7 +33,11 @@ fn shape(raw: &RawShape, names: &Names, numbers: &mut Numbers) -> Option<Shape> 
 /// Reports dimensions that are superfluous or missing.
 fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) {
     let word = a(spec.word());
-    let lists = [raw.hull.as_ref().map(|hull| &hull.keys), raw.field.as_ref().map(|field| &field.keys)];
+    let lists = [
+        raw.hull.as_ref().map(|hull| &hull.keys),
+        #[cfg(feature = "height_fields")]
+        raw.field.as_ref().map(|field| &field.keys),
+    ];
     let listed = |key: &str| lists.iter().flatten().copied().flatten().find(|(k, _)| *k == key).map(|(_, span)| *span);
     let given = [
         ("radius", raw.radius.as_ref().map(|x| x.span), "`radius = ..`, in metres"),
@@ -45,7 +49,9 @@ fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) 
         ("file", listed("file"), ""),
         ("scale", listed("scale"), ""),
         ("most", listed("most"), ""),
+        #[cfg(feature = "height_fields")]
         ("spacing", listed("spacing"), "`spacing = [x, y]`, the distances of neighbouring heights in metres"),
+        #[cfg(feature = "height_fields")]
         ("heights", listed("heights"), ""),
     ];
     for (key, span, example) in given {
@@ -64,6 +70,7 @@ fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) 
             _ => {}
         }
     }
+    #[cfg(feature = "height_fields")]
     if spec.word() == "height_field" && listed("heights").or(listed("file")).is_none() {
         let help = "add `heights = [[0, 0, 0, 0], ..]`, rows along x in metres, or `file = \"heights.csv\"`";
         numbers.findings.error(raw.name.span, format!("{what}: a height field needs `heights` or a `file`"), help);
@@ -160,13 +167,13 @@ fn size(x: &RawNumber, key: &str, help: &str, what: &str, numbers: &mut Numbers)
 /// Corners and ends are places that are known when the code is generated; only a point, a sphere, an ellipsoid, a plane or a
 /// height field, which are their origins with a size, can be moved by a parameter.
 fn still(raw: &RawShape, shape: &Shape, what: &str, numbers: &mut Numbers) {
+    #[cfg(feature = "height_fields")]
+    if let ShapeKind::HeightField { .. } = shape.kind {
+        return;
+    }
     if matches!(
         shape.kind,
-        ShapeKind::Point
-            | ShapeKind::Sphere { .. }
-            | ShapeKind::Plane { .. }
-            | ShapeKind::Ellipsoid { .. }
-            | ShapeKind::HeightField { .. }
+        ShapeKind::Point | ShapeKind::Sphere { .. } | ShapeKind::Plane { .. } | ShapeKind::Ellipsoid { .. }
     ) {
         return;
     }

@@ -1,6 +1,5 @@
 //! Constants of a generated type: dimensions, names, indices.
 
-use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use mbd_runtime::system::Row;
@@ -9,10 +8,8 @@ use mbd_runtime::tree::Source;
 use super::names::constant;
 use super::numbers::literal;
 use super::Input;
-use crate::model::ShapeKind;
 use crate::options::Options;
 use crate::output::Output;
-use crate::plan::Plan;
 
 /// A constant.
 pub struct Constant {
@@ -149,32 +146,45 @@ pub fn write(out: &mut String, constants: &[Constant], options: &Options) {
     }
 }
 
-/// Name of a constant with a table, which is the same wherever the table is.
-pub fn table(table: &[f64]) -> String {
-    // The hash of Fowler, Noll and Vo of the bits.
-    let bytes = table.iter().flat_map(|x| x.to_bits().to_le_bytes());
-    let hash =
-        bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));
-    format!("TABLE_{hash:016X}")
-}
+#[cfg(feature = "height_fields")]
+pub use of_fields::{table, tables};
 
-/// The tables of height fields as Rust, each once.
-pub fn tables(out: &mut String, plan: &Plan) {
-    let mut all = BTreeMap::new();
-    for shape in &plan.model.shapes {
-        if let ShapeKind::HeightField { field, .. } = shape.kind {
-            let tables = [field.net].into_iter().chain(field.cells).chain(field.inside);
-            all.extend(tables.map(|numbers| (table(numbers), numbers)));
-        }
+/// Tables of height fields.
+#[cfg(feature = "height_fields")]
+mod of_fields {
+    use std::collections::BTreeMap;
+    use std::fmt::Write;
+
+    use crate::model::ShapeKind;
+    use crate::plan::Plan;
+
+    /// Name of a constant with a table, which is the same wherever the table is.
+    pub fn table(table: &[f64]) -> String {
+        // The hash of Fowler, Noll and Vo of the bits.
+        let bytes = table.iter().flat_map(|x| x.to_bits().to_le_bytes());
+        let hash =
+            bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));
+        format!("TABLE_{hash:016X}")
     }
-    for (name, numbers) in all {
-        let n = numbers.len();
-        let _ = writeln!(out, "    /// A table of height fields.\n    const {name}: &'static [f64; {n}] = &[");
-        for row in numbers.chunks(8) {
-            let row: Vec<String> = row.iter().map(|x| format!("{x:?}")).collect();
-            let _ = writeln!(out, "        {},", row.join(", "));
+
+    /// The tables of height fields as Rust, each once.
+    pub fn tables(out: &mut String, plan: &Plan) {
+        let mut all = BTreeMap::new();
+        for shape in &plan.model.shapes {
+            if let ShapeKind::HeightField { field, .. } = shape.kind {
+                let tables = [field.net].into_iter().chain(field.cells).chain(field.inside);
+                all.extend(tables.map(|numbers| (table(numbers), numbers)));
+            }
         }
-        let _ = writeln!(out, "    ];");
+        for (name, numbers) in all {
+            let n = numbers.len();
+            let _ = writeln!(out, "    /// A table of height fields.\n    const {name}: &'static [f64; {n}] = &[");
+            for row in numbers.chunks(8) {
+                let row: Vec<String> = row.iter().map(|x| format!("{x:?}")).collect();
+                let _ = writeln!(out, "        {},", row.join(", "));
+            }
+            let _ = writeln!(out, "    ];");
+        }
     }
 }
 

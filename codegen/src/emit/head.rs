@@ -3,12 +3,11 @@
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
-use super::constants;
 use super::numbers::{literal, minus, signed};
 use super::signature::{Port, Signature};
 use crate::options::{Arithmetic, Options};
 use crate::output::{locate, InputArray};
-use crate::symbolic::{FlooredReciprocal, Fma, LookUp, Op, Operand, ProgramResult};
+use crate::symbolic::{FlooredReciprocal, Fma, Op, Operand, ProgramResult};
 
 /// Largest number of statements of a function that is inlined, so that small kernels become part of the caller's loop.
 const INLINED: usize = 300;
@@ -116,8 +115,9 @@ impl Head<'_> {
                 let (rt, v, f) = (&self.options.runtime, minus(*minus_value), minus(*minus_floor));
                 format!("{rt}::Scalar::reciprocal_above({v}{value}, {f}{floor})")
             }
-            Op::LookUp(LookUp { at, minus: negative, table, offset }) => {
-                let (rt, sign, name) = (&self.options.runtime, minus(*negative), constants::table(table.0));
+            #[cfg(feature = "height_fields")]
+            Op::LookUp(crate::symbolic::LookUp { at, minus: negative, table, offset }) => {
+                let (rt, sign, name) = (&self.options.runtime, minus(*negative), super::constants::table(table.0));
                 format!("{rt}::Scalar::look_up({sign}{}, Self::{name}, {offset})", names[at])
             }
             Op::Sqrt(a) => format!("{}::Scalar::sqrt({})", self.options.runtime, names[a]),

@@ -333,6 +333,7 @@ pub struct RawShape {
     /// What a hull is made of.
     pub hull: Option<RawHull>,
     /// What a height field is made of.
+    #[cfg(feature = "height_fields")]
     pub field: Option<RawField>,
 }
 
@@ -346,6 +347,7 @@ pub struct RawHull {
 }
 
 /// The heights of a field, with the entries that they were read from.
+#[cfg(feature = "height_fields")]
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawField {
     /// The keys that stand there, with their places.
@@ -370,6 +372,7 @@ impl RawShape {
             semi_axes: None,
             normal: None,
             hull: None,
+            #[cfg(feature = "height_fields")]
             field: None,
         }
     }

@@ -273,6 +273,7 @@ impl Writer<'_> {
     }
 }
 
+#[cfg(feature = "height_fields")]
 impl Writer<'_> {
     /// The entry of a table, which stays where it is for as long as the program runs.
     fn entry_of(&mut self, at: Value, table: &'static [f64], offset: usize) -> Value {
@@ -362,6 +363,7 @@ impl Instructions for Writer<'_> {
                 let below = self.b.ins().bitcast(self.number, flags, below);
                 self.b.ins().bitselect(below, zero, reciprocal)
             }
+            #[cfg(feature = "height_fields")]
             Operation::LookUp { at, table, offset } => match self.number.is_vector() {
                 false => self.entry_of(at, table, offset),
                 true => {

@@ -94,6 +94,7 @@ pub enum Operation<V> {
         floor: V,
     },
     /// An entry of a table, as [`Scalar::look_up`](mbd_runtime::Scalar::look_up) finds it.
+    #[cfg(feature = "height_fields")]
     LookUp {
         /// The number of the entry.
         at: V,
@@ -119,6 +120,7 @@ impl<V> Operation<V> {
             Operation::ReciprocalAbove { value, floor } => {
                 Operation::ReciprocalAbove { value: f(value), floor: f(floor) }
             }
+            #[cfg(feature = "height_fields")]
             Operation::LookUp { at, table, offset } => Operation::LookUp { at: f(at), table, offset },
             Operation::Sqrt(a) => Operation::Sqrt(f(a)),
         }

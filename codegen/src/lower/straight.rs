@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::memory::Home;
 use super::{Array, Instructions, Operation, Place, Spills};
 use crate::symbolic::angles::Angles;
-use crate::symbolic::{FlooredReciprocal, Fma, Label, LookUp, Op, Operand, Program, ProgramResult};
+use crate::symbolic::{FlooredReciprocal, Fma, Label, Op, Operand, Program, ProgramResult};
 
 /// A body that is being told.
 pub(super) struct Lowering<'a, I: Instructions> {
@@ -86,7 +86,8 @@ impl<'a, I: Instructions> Lowering<'a, I> {
                     floor: self.signed(floor, minus_floor),
                 }
             }
-            Op::LookUp(LookUp { at, minus, table, offset }) => {
+            #[cfg(feature = "height_fields")]
+            Op::LookUp(crate::symbolic::LookUp { at, minus, table, offset }) => {
                 Operation::LookUp { at: self.signed(values.get(at), minus), table: table.0, offset: offset as usize }
             }
             Op::Sqrt(a) => Operation::Sqrt(values.get(a)),

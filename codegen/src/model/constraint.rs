@@ -3,6 +3,7 @@
 //! A new kind of loop is a variant of [`LoopKind`] with its [`LoopSpec`] in this file, and its rows in the sweeps
 //! ([`mbd_runtime::tree::Closure`]).
 
+#[cfg(feature = "height_fields")]
 use mbd_runtime::field::{Ball, Field};
 use mbd_runtime::spatial::Axis;
 use mbd_runtime::tree::Closure;
@@ -138,6 +139,7 @@ pub enum LoopKind {
     },
     /// A ball about the second frame's origin, or this point, rolls without slip on a height field in the axes of the first.
     /// Contacts are of this kind; loops in models are not.
+    #[cfg(feature = "height_fields")]
     RollingBallOnField {
         /// The field.
         field: &'static Field,
@@ -261,6 +263,7 @@ const PLAIN: LoopSpec = LoopSpec {
 use Stands::{InBoth, InFirst, InSecond};
 
 /// What rolls on height fields, which is no kind of loop in models.
+#[cfg(feature = "height_fields")]
 static ON_FIELD: LoopSpec =
     LoopSpec { words: Words::new("rolling_ball_on_field", &[], &[]), rows: &[M, M, M], ..PLAIN };
 
@@ -459,6 +462,7 @@ impl LoopKind {
             LoopKind::RollingCapsules { .. } => 16,
             LoopKind::RollingBallOnBox { .. } => 17,
             LoopKind::RollingBallOnCylinder { .. } => 18,
+            #[cfg(feature = "height_fields")]
             LoopKind::RollingBallOnField { .. } => return &ON_FIELD,
             LoopKind::KnifeEdge { .. } => 19,
             LoopKind::Pfaffian { .. } => 20,
@@ -494,8 +498,9 @@ impl LoopKind {
             | LoopKind::Distance { .. }
             | LoopKind::RollingBalls { .. }
             | LoopKind::RollingBallOnBox { .. }
-            | LoopKind::RollingBallOnField { .. }
             | LoopKind::Pfaffian { .. } => Vec::new(),
+            #[cfg(feature = "height_fields")]
+            LoopKind::RollingBallOnField { .. } => Vec::new(),
         }
     }
 
@@ -512,6 +517,7 @@ impl LoopKind {
             LoopKind::RollingCapsules { lengths, radii, .. } => lengths.iter_mut().chain(radii).collect(),
             LoopKind::RollingBallOnBox { size, radius } => size.iter_mut().chain([radius]).collect(),
             LoopKind::RollingBallOnCylinder { length, radii, .. } => [length].into_iter().chain(radii).collect(),
+            #[cfg(feature = "height_fields")]
             LoopKind::RollingBallOnField { ball, .. } => ball.iter_mut().map(|ball| &mut ball.radius).collect(),
             LoopKind::Pfaffian { row } => row.iter_mut().collect(),
             _ => Vec::new(),
@@ -540,6 +546,7 @@ impl LoopKind {
             LoopKind::RollingCapsules { lengths, radii, .. } => Closure::RollingCapsules { lengths, radii },
             LoopKind::RollingBallOnBox { size, radius } => Closure::RollingBallOnBox { size, radius },
             LoopKind::RollingBallOnCylinder { length, radii, .. } => Closure::RollingBallOnCylinder { length, radii },
+            #[cfg(feature = "height_fields")]
             LoopKind::RollingBallOnField { field, ball } => Closure::RollingBallOnField { field, ball },
             LoopKind::KnifeEdge { .. } => Closure::KnifeEdge,
             LoopKind::Pfaffian { row } => Closure::Pfaffian { row },

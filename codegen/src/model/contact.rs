@@ -1,6 +1,7 @@
 //! Contacts of the model: pairs of places that can touch, and stops of joints; the one table of the kinds of shapes.
 
 use mbd_runtime::contact::RestitutionLaw;
+#[cfg(feature = "height_fields")]
 use mbd_runtime::field::Field;
 
 use super::{ConstraintKind, Mount, Origin, Words};
@@ -74,6 +75,7 @@ pub enum ShapeKind {
         points: Vec<[f64; 3]>,
     },
     /// Ground below a smooth surface `z = h(x, y)`.
+    #[cfg(feature = "height_fields")]
     HeightField {
         /// The surface.
         field: &'static Field,
@@ -132,8 +134,8 @@ impl ShapeKind {
             ShapeKind::Ellipsoid { .. } => 5,
             ShapeKind::Plane { .. } => 6,
             ShapeKind::Hull { .. } => 7,
-            // Without height fields, models have none.
-            ShapeKind::HeightField { .. } => SHAPES.len() - 1,
+            #[cfg(feature = "height_fields")]
+            ShapeKind::HeightField { .. } => 8,
         };
         &SHAPES[index]
     }

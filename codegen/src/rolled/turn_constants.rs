@@ -47,6 +47,7 @@ pub fn value(op: Op, link: &Link<'_, '_>, row: &[f64], values: &BTreeMap<u32, f6
         Op::ReciprocalAbove(p) => {
             Scalar::reciprocal_above(signed(of(p.value), p.minus_value), signed(of(p.floor), p.minus_floor))
         }
+        #[cfg(feature = "height_fields")]
         Op::LookUp(look) => signed(node(look.at), look.minus).look_up(look.table.0, look.offset as usize),
         Op::Sqrt(a) => Scalar::sqrt(node(a)),
         Op::Sin(a) => Scalar::sin_cos(node(a)).0,

@@ -27,6 +27,7 @@ impl Program {
                 Op::ReciprocalAbove(p) => {
                     signed(get(p.value), p.minus_value).reciprocal_above(signed(get(p.floor), p.minus_floor))
                 }
+                #[cfg(feature = "height_fields")]
                 Op::LookUp(look) => {
                     signed(values[look.at as usize], look.minus).look_up(look.table.0, look.offset as usize)
                 }

@@ -36,6 +36,7 @@ pub enum Op {
     /// `1 / ±a` where that is above `±floor`, else zero.
     ReciprocalAbove(FlooredReciprocal),
     /// The entry of a table.
+    #[cfg(feature = "height_fields")]
     LookUp(LookUp),
     /// Square root.
     Sqrt(u32),
@@ -75,6 +76,7 @@ pub struct FlooredReciprocal {
 }
 
 /// An entry of a table; see [`Scalar::look_up`].
+#[cfg(feature = "height_fields")]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct LookUp {
     /// The node whose value is the number of the entry.
@@ -88,23 +90,28 @@ pub struct LookUp {
 }
 
 /// A table of numbers. Tables are equal where they are the same one.
+#[cfg(feature = "height_fields")]
 #[derive(Clone, Copy)]
 pub struct Table(pub &'static [f64]);
 
+#[cfg(feature = "height_fields")]
 impl PartialEq for Table {
     fn eq(&self, other: &Table) -> bool {
         std::ptr::eq(self.0, other.0)
     }
 }
 
+#[cfg(feature = "height_fields")]
 impl Eq for Table {}
 
+#[cfg(feature = "height_fields")]
 impl std::hash::Hash for Table {
     fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
         state.write_usize(self.0.as_ptr() as usize);
     }
 }
 
+#[cfg(feature = "height_fields")]
 impl std::fmt::Debug for Table {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "table of {} numbers", self.0.len())
@@ -119,9 +126,9 @@ impl Op {
             Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) => [Some(a), Some(b), None],
             Op::Fma(f) => [Some(f.a), Some(f.b), Some(f.c)],
             Op::ReciprocalAbove(p) => [Some(p.value), Some(p.floor), None],
-            Op::Sqrt(a) | Op::Sin(a) | Op::Cos(a) | Op::LookUp(LookUp { at: a, .. }) => {
-                [Some(Operand::Node(a)), None, None]
-            }
+            Op::Sqrt(a) | Op::Sin(a) | Op::Cos(a) => [Some(Operand::Node(a)), None, None],
+            #[cfg(feature = "height_fields")]
+            Op::LookUp(look) => [Some(Operand::Node(look.at)), None, None],
         };
         all.into_iter().flatten()
     }
@@ -142,6 +149,7 @@ impl Op {
             Op::ReciprocalAbove(p) => {
                 Op::ReciprocalAbove(FlooredReciprocal { value: o(p.value), floor: o(p.floor), ..p })
             }
+            #[cfg(feature = "height_fields")]
             Op::LookUp(look) => Op::LookUp(LookUp { at: id(look.at), ..look }),
             Op::Sqrt(a) => Op::Sqrt(id(a)),
             Op::Sin(a) => Op::Sin(id(a)),
@@ -458,6 +466,7 @@ impl Scalar for Expr<'_> {
         }
     }
 
+    #[cfg(feature = "height_fields")]
     fn look_up(self, table: &'static [f64], offset: usize) -> Self {
         match self {
             Expr::Const(x) => Expr::Const(x.look_up(table, offset)),
@@ -465,6 +474,11 @@ impl Scalar for Expr<'_> {
                 graph.node(Op::LookUp(LookUp { at, minus, table: Table(table), offset: offset as u32 }), false)
             }
         }
+    }
+
+    #[cfg(not(feature = "height_fields"))]
+    fn look_up(self, _: &'static [f64], _: usize) -> Self {
+        unreachable!("only height fields have tables")
     }
 }
 
@@ -500,11 +514,6 @@ mod tests {
         same(c(4.0).reciprocal_above(c(1.0)), c(0.25));
         same(c(0.0).reciprocal_above(c(0.0)), c(0.0));
         same(c(0.0).reciprocal_above(x), c(0.0));
-        static TABLE: [f64; 3] = [1.0, 2.0, 4.0];
-        same(c(1.5).look_up(&TABLE, 1), c(4.0));
-        same(x.look_up(&TABLE, 1), x.look_up(&TABLE, 1));
-        assert_ne!(x.look_up(&TABLE, 1).split(), x.look_up(&TABLE, 0).split());
-        assert_ne!(x.look_up(&TABLE, 1).split(), (-x).look_up(&TABLE, 1).split());
         // The sign of the inverted value decides.
         assert_ne!((-x).reciprocal_above(y).split(), (-(x.reciprocal_above(y))).split());
         same((-x).sin_cos().0, -(x.sin_cos().0));
@@ -512,5 +521,18 @@ mod tests {
         // Rewritings that are not exact are not made.
         let (Expr::Node { id, .. }, true) = ((x + c(1.0)) + c(2.0), true) else { panic!() };
         assert!(matches!(g.get(id).0, Op::Add(Operand::Node(_), Operand::Const(_))));
+    }
+
+    #[cfg(feature = "height_fields")]
+    #[test]
+    fn look_ups_are_shared() {
+        static TABLE: [f64; 3] = [1.0, 2.0, 4.0];
+        let (g, c) = (Graph::default(), Expr::Const);
+        let x = g.input(0);
+        let same = |a: Expr, b: Expr| assert_eq!(a.split(), b.split());
+        same(c(1.5).look_up(&TABLE, 1), c(4.0));
+        same(x.look_up(&TABLE, 1), x.look_up(&TABLE, 1));
+        assert_ne!(x.look_up(&TABLE, 1).split(), x.look_up(&TABLE, 0).split());
+        assert_ne!(x.look_up(&TABLE, 1).split(), (-x).look_up(&TABLE, 1).split());
     }
 }

@@ -12,6 +12,7 @@ pub fn latency(op: &Op) -> u32 {
         // A division and a mask.
         Op::ReciprocalAbove(_) => DIVISION + 1,
         // A conversion, two comparisons and a load.
+        #[cfg(feature = "height_fields")]
         Op::LookUp(_) => 14,
         Op::Sqrt(_) => 15,
         Op::Sin(_) | Op::Cos(_) => SINE,
@@ -69,6 +70,7 @@ pub fn pipe(op: &Op) -> (Pipe, u32) {
         Op::Mul(..) | Op::Fma(_) => (Pipe::Multiply, 1),
         Op::Div(..) | Op::ReciprocalAbove(_) => (Pipe::Multiply, 5),
         // The conversion; units that the model does not have do the rest.
+        #[cfg(feature = "height_fields")]
         Op::LookUp(_) => (Pipe::Add, 1),
         Op::Sqrt(_) => (Pipe::Multiply, 7),
         // Half of a pair; both together take about thirty products.

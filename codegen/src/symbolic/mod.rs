@@ -14,6 +14,8 @@ pub mod passes;
 mod program;
 
 pub use cost::{cost, Cost, BYTES};
-pub use expr::{Entry, Expr, FlooredReciprocal, Fma, Graph, Label, LookUp, Name, Op, Operand, Table};
+pub use expr::{Entry, Expr, FlooredReciprocal, Fma, Graph, Label, Name, Op, Operand};
+#[cfg(feature = "height_fields")]
+pub use expr::{LookUp, Table};
 pub use passes::Rewrite;
 pub use program::{Counts, Program, ProgramResult};

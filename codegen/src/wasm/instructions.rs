@@ -185,6 +185,7 @@ impl Instructions for Writer<'_> {
                 let below = self.body.one(number.not_above(), &[value, floor], condition);
                 self.give(select, &[number.constant(0.0), reciprocal, below]).into()
             }
+            #[cfg(feature = "height_fields")]
             Operation::LookUp { .. } => unreachable!("only contacts look numbers up, and WebAssembly has none"),
             Operation::Sqrt(a) => {
                 let a = self.value(a);

@@ -42,6 +42,7 @@ fn radii<S: Real>(closure: &Closure<S>) -> Option<(Option<f64>, f64)> {
         Closure::RollingBallOnCylinder { length: l, radii: [a, b] } => {
             (Some(length([S::constant(0.5) * *l, *a])), b.abs().to_f64())
         }
+        #[cfg(feature = "height_fields")]
         Closure::RollingBallOnField { ball, .. } => (None, ball.map_or(0.0, |ball| ball.radius.abs().to_f64())),
         _ => return None,
     })
@@ -129,6 +130,7 @@ impl<S: Real> Tree<S> {
                 self.slides(&cut.path_b, turns, table);
             }
         }
+        #[cfg(feature = "height_fields")]
         if let Closure::RollingBallOnField { field, .. } = cut.closure {
             // The gap is at most the way down to the ground, which is nearer than that by the cosine of the steepest slope.
             let steep = libm::sqrt(1.0 + field.slope * field.slope);

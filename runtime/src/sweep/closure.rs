@@ -95,8 +95,9 @@ impl<S: Copy> Closure<S> {
             | Closure::RollingBalls { .. }
             | Closure::RollingCapsules { .. }
             | Closure::RollingBallOnBox { .. }
-            | Closure::RollingBallOnCylinder { .. }
-            | Closure::RollingBallOnField { .. } => 3,
+            | Closure::RollingBallOnCylinder { .. } => 3,
+            #[cfg(feature = "height_fields")]
+            Closure::RollingBallOnField { .. } => 3,
             Closure::PointOnLine => 2,
             Closure::Distance { .. }
             | Closure::PointOnPlane
@@ -116,9 +117,13 @@ impl<S: Copy> Closure<S> {
 
     /// Whether two surfaces roll on each other without slip: the first row is their distance, the others their slip.
     pub fn rolls(&self) -> bool {
+        #[cfg(feature = "height_fields")]
+        if let Closure::RollingBallOnField { .. } = self {
+            return true;
+        }
         use Closure::{
-            RollingBall, RollingBallOnBox, RollingBallOnCylinder, RollingBallOnField, RollingBalls, RollingCapsules,
-            RollingDisc, RollingEllipsoid,
+            RollingBall, RollingBallOnBox, RollingBallOnCylinder, RollingBalls, RollingCapsules, RollingDisc,
+            RollingEllipsoid,
         };
         matches!(
             self,
@@ -129,7 +134,6 @@ impl<S: Copy> Closure<S> {
                 | RollingCapsules { .. }
                 | RollingBallOnBox { .. }
                 | RollingBallOnCylinder { .. }
-                | RollingBallOnField { .. }
         )
     }
 

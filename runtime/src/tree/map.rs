@@ -3,6 +3,7 @@
 use alloc::boxed::Box;
 
 use super::{Bond, Closure, Constraint, Cut, Kind, Node, Passive, Tree, TreeFrame, TreeWrench};
+#[cfg(feature = "height_fields")]
 use crate::field::Ball;
 use crate::spatial::{ElementaryTransform, RigidInertia};
 use crate::Scalar;
@@ -150,6 +151,7 @@ impl<S: Copy> Closure<S> {
             Closure::RollingBallOnCylinder { length, radii } => {
                 Closure::RollingBallOnCylinder { length: of(length), radii: radii.map(of) }
             }
+            #[cfg(feature = "height_fields")]
             Closure::RollingBallOnField { field, ball } => Closure::RollingBallOnField {
                 field,
                 ball: ball.map(|Ball { radius, steps }| Ball { radius: of(radius), steps }),

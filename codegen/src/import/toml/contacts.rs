@@ -88,8 +88,6 @@ fn shape(table: &Table, named: &Named, raw: &mut RawModel, findings: &mut Findin
         hull: hull(table, word == "hull", named, findings),
         #[cfg(feature = "height_fields")]
         field: super::heights::field(table, word == "height_field", named, findings),
-        #[cfg(not(feature = "height_fields"))]
-        field: None,
     };
     match name {
         Some(_) => raw.shapes.push(shape),

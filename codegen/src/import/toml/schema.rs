@@ -131,7 +131,9 @@ fn property(table: &str, key: &str) -> String {
             format!("{{ \"type\": \"array\", \"items\": {} }}", reference(key))
         }
         (_, "points") => reference("points"),
+        #[cfg(feature = "height_fields")]
         (_, "heights") => reference("rows"),
+        #[cfg(feature = "height_fields")]
         (_, "spacing") => r#"{ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 }"#.into(),
         (_, "most") => {
             format!("{{ \"type\": \"integer\", \"minimum\": {}, \"maximum\": {} }}", hull::MOST.0, hull::MOST.1)

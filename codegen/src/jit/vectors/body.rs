@@ -306,6 +306,7 @@ impl Instructions for Body {
                 let x = self.binary(Binary::Div, one, value);
                 Signed { id: self.value(Step::ZeroBelow { value, floor, x }), minus: false }
             }
+            #[cfg(feature = "height_fields")]
             Operation::LookUp { .. } => unreachable!("programs that look numbers up are left to Cranelift"),
             Operation::Sqrt(a) => {
                 let a = self.plain(a);

@@ -116,6 +116,7 @@ pub fn compile(
     width: Width,
     sines: u64,
 ) -> Option<Written> {
+    #[cfg(feature = "height_fields")]
     if program.program.looks_up() {
         return None;
     }

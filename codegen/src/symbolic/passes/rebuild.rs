@@ -57,6 +57,7 @@ impl<'g> Rebuilt<'g> {
                 let floor = signed(self.get(p.floor), p.minus_floor);
                 signed(self.get(p.value), p.minus_value).reciprocal_above(floor)
             }
+            #[cfg(feature = "height_fields")]
             Op::LookUp(look) => signed(node(look.at), look.minus).look_up(look.table.0, look.offset as usize),
             Op::Sqrt(a) => node(a).sqrt(),
             Op::Sin(a) => node(a).sin_cos().0,
