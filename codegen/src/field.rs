@@ -69,7 +69,12 @@ fn steepest(net: &[f64], width: usize, [dx, dy]: [f64; 2]) -> f64 {
         let pairs = (step..net.len()).filter(|k| along || k % width != 0).map(|k| (net[k] - net[k - step]).abs());
         pairs.fold(0.0, f64::max) / spacing
     };
-    most(1, dx, false).hypot(most(width, dy, true))
+    length(most(1, dx, false), most(width, dy, true))
+}
+
+/// Length of a vector: a root, which is rounded the same on every host.
+fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
 }
 
 /// A table that stays for as long as the program runs: code that was made at run time reads it, and the operations of the
@@ -129,7 +134,7 @@ fn tried(field: &Field, radius: f64) -> Fit {
             let middle = [x - radius * cosine * p, y - radius * cosine * q];
             let near = |steps: usize| {
                 let found = field.under(middle, Some(Ball { radius, steps })).place;
-                (found[0] - x).hypot(found[1] - y) <= NEAR * radius
+                length(found[0] - x, found[1] - y) <= NEAR * radius
             };
             // As many as were enough elsewhere, mostly.
             if near(fit.steps - 1) {

@@ -341,6 +341,9 @@ fn heights_of_a_file_are_those_of_the_model() {
             Ok(file.clone().into_bytes())
         };
         let (read, findings) = mbd_codegen::read::load_with("robots/m.toml", &text, &Default::default(), &files);
+        // A converted model has the heights, without the file.
+        let (converted, _) = mbd_codegen::read::to_toml("robots/m.toml", &text, &Default::default(), &files).unwrap();
+        assert_eq!(of(&model(&converted)), of(&read.as_ref().unwrap_or_else(|| panic!("{findings}")).0));
         read.unwrap_or_else(|| panic!("{findings}")).0
     });
     assert_eq!(of(&inside), of(&outside));
