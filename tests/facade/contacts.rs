@@ -115,15 +115,15 @@ fn all_sets_of_modes() {
 fn a_height_field() {
     let ball = compared(made::OnHills::new(), "ball_on_hills.toml", None, &[0.7, 0.4, 0.0, 0.0, 0.0, 0.0], 1.5);
     assert_eq!(ways(&ball), [true, false], "{:?}", ball.steps);
-    // Rounded to single precision, and in other functions, the ball lands about where it does.
-    let mut single = made::OnHillsSingle::new();
+    // In single precision, and by the functions for all modes, the gap at the start is the same to rounding errors.
+    let single = made::OnHillsSingle::new();
     let (mut gaps, mut rates) = (single.zero_rows(), single.zero_rows());
     let (mut entries, v) = (single.zero_entries(), single.zero_momenta());
-    single.gaps(0.0, &made::OnHillsSingle::START, &v, &mut gaps, &mut rates, &mut entries);
-    let mut double = made::OnHills::new();
+    single.gaps(&made::OnHillsSingle::START, &v, &mut gaps, &mut rates, &mut entries);
+    let double = made::OnHills::new();
     let (mut wanted, mut rates) = (double.zero_rows(), double.zero_rows());
     let (mut entries, v) = (double.zero_entries(), double.zero_momenta());
-    double.gaps(0.0, &made::OnHills::START, &v, &mut wanted, &mut rates, &mut entries);
+    double.gaps(&made::OnHills::START, &v, &mut wanted, &mut rates, &mut entries);
     // A few roundings of numbers below 10.
     assert!((f64::from(gaps[0]) - wanted[0]).abs() < 1e-5, "{gaps:?} {wanted:?}");
 }

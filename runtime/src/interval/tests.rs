@@ -235,3 +235,14 @@ fn mean_value_forms() {
     let fall = [excess[0][0] / excess[1][0], excess[0][1] / excess[1][1]];
     assert!((3.5..4.5).contains(&fall[0]) && (14.0..18.0).contains(&fall[1]), "{fall:?}");
 }
+
+#[test]
+fn tables_give_the_entries_of_all_numbers() {
+    static TABLE: [f64; 4] = [1.0, -2.0, 5.0, 3.0];
+    let at = |low: f64, high: f64, offset| Interval::new(low, high).expect("bounds").look_up(&TABLE, offset);
+    assert_eq!(at(0.2, 0.8, 0), Interval::point(1.0));
+    assert_eq!(at(0.2, 1.0, 0), Interval::new(-2.0, 1.0).expect("bounds"));
+    assert_eq!(at(-3.0, 1.5, 1), Interval::new(-2.0, 5.0).expect("bounds"));
+    assert_eq!(at(2.5, 1e30, 3), Interval::point(3.0));
+    assert_eq!(Interval::ENTIRE.look_up(&TABLE, 2), Interval::new(3.0, 5.0).expect("bounds"));
+}
