@@ -186,7 +186,11 @@ impl<S: Number> MachineCode<S> {
         signature.returns.push(AbiParam::new(types::I32));
         let id = module.declare_function(program.spec.name, Linkage::Local, &signature);
         let id = id.map_err(CompileError::machine)?;
-        let body = match Width::of_lanes(lanes).filter(|_| S::PRECISION == Precision::F64) {
+        let own = Width::of_lanes(lanes).filter(|_| S::PRECISION == Precision::F64);
+        // Cranelift has the instructions that find an entry of a table.
+        #[cfg(feature = "height_fields")]
+        let own = own.filter(|_| lanes > 1 || !program.program.looks_up());
+        let body = match own {
             Some(width) => {
                 let sines = S::SINES[usize::from(fast)] as usize as u64;
                 let written = vectors::compile(program, &results, fused, width, sines)

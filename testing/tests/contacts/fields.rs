@@ -316,7 +316,9 @@ fn machine_code_looks_up_what_the_interpreter_does() {
     let (q, p, _) = end(plan.default_contact_interpreter::<f64>(), &plan, 1.5);
     let options = Options { arithmetic: Arithmetic::Exact, ..Options::default() };
     let (other_q, other_p, steps) = end(plan.compiled_with_contacts::<f64>(&options, 10).unwrap(), &plan, 1.5);
-    assert!(steps[Way::Compiled as usize] > 10, "{steps:?}");
+    println!("{steps:?} steps");
+    // In flight and on the ground, all but the first steps.
+    assert!(steps[Way::Compiled as usize] > 3 * steps[Way::Interpreted as usize], "{steps:?}");
     assert_eq!((other_q, other_p), (q, p));
 }
 

@@ -108,7 +108,7 @@ pub fn one_state(precision: Precision) -> Option<Width> {
 }
 
 /// Machine code of a program whose results fill arrays of the lengths `results`. `sines` is the address of the runtime's
-/// function for sines and cosines. `None` if it is too long or looks numbers up in tables.
+/// function for sines and cosines. `None` if it is too long, or looks numbers up in tables, which Cranelift does.
 pub fn compile(
     program: &OutputProgram<Code>,
     results: &[usize],
