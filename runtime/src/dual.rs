@@ -87,6 +87,10 @@ impl<S: Scalar> Scalar for Dual<S> {
         Dual::new(self.re.look_up(table, offset), S::zero())
     }
 
+    fn still(self) -> Self {
+        Dual::new(self.re.still(), S::zero())
+    }
+
     fn node(self) -> Option<(u32, bool)> {
         self.re.node()
     }

@@ -112,24 +112,18 @@ impl Field {
     /// Where a ball, or a point, touches that is let down along z with its middle over a place, m. It touches at one place
     /// where it has a smaller radius than every hollow.
     pub fn under<S: Scalar>(&self, middle: [S; 2], ball: Option<Ball<S>>) -> Foot<S> {
-        let mut foot = self.foot(middle, middle, ball.map(|ball| ball.radius));
-        let Some(Ball { radius, steps }) = ball else { return foot };
-        for _ in 0..steps {
-            let Foot { place, ground: Ground { slope: [p, q], bend: [a, b, c], .. }, cosine, off } = foot;
-            // The derivative of `off` by `place`: 1 − r w (1 − w² ∇h ∇hᵀ) H.
-            let along = [a * p + b * q, b * p + c * q].map(|x| cosine * cosine * x);
-            let factor = radius * cosine;
-            let one = S::one();
-            let m = [
-                [one - factor * (a - p * along[0]), -(factor * (b - p * along[1]))],
-                [-(factor * (b - q * along[0])), one - factor * (c - q * along[1])],
-            ];
-            let inverse = (m[0][0] * m[1][1] - m[0][1] * m[1][0]).reciprocal_above(S::constant(1e-6));
-            let step = [m[1][1] * off[0] - m[0][1] * off[1], m[0][0] * off[1] - m[1][0] * off[0]];
-            let next = core::array::from_fn(|k| place[k] - inverse * step[k]);
-            foot = self.foot(next, middle, Some(radius));
+        let Some(Ball { radius, steps }) = ball else { return self.foot(middle, middle, None) };
+        // Two steps from any place near the solution give it its derivatives up to the third.
+        let early = steps.saturating_sub(2);
+        let (still, of_early) = (middle.map(S::still), radius.still());
+        let mut place = if early > 0 { still } else { middle };
+        for _ in 0..early {
+            place = self.foot(place, still, Some(of_early)).next(of_early);
         }
-        foot
+        for _ in early..steps {
+            place = self.foot(place, middle, Some(radius)).next(radius);
+        }
+        self.foot(place, middle, Some(radius))
     }
 
     fn foot<S: Scalar>(&self, place: [S; 2], middle: [S; 2], radius: Option<S>) -> Foot<S> {
@@ -144,5 +138,23 @@ impl Field {
             None => [S::zero(); 2],
         };
         Foot { place, ground, cosine, off }
+    }
+}
+
+impl<S: Scalar> Foot<S> {
+    /// The place after a step of Newton's method, m.
+    fn next(&self, radius: S) -> [S; 2] {
+        let Foot { place, ground: Ground { slope: [p, q], bend: [a, b, c], .. }, cosine, off } = *self;
+        // The derivative of `off` by `place`: 1 − r w (1 − w² ∇h ∇hᵀ) H.
+        let along = [a * p + b * q, b * p + c * q].map(|x| cosine * cosine * x);
+        let factor = radius * cosine;
+        let one = S::one();
+        let m = [
+            [one - factor * (a - p * along[0]), -(factor * (b - p * along[1]))],
+            [-(factor * (b - q * along[0])), one - factor * (c - q * along[1])],
+        ];
+        let inverse = (m[0][0] * m[1][1] - m[0][1] * m[1][0]).reciprocal_above(S::constant(1e-6));
+        let step = [m[1][1] * off[0] - m[0][1] * off[1], m[0][0] * off[1] - m[1][0] * off[0]];
+        core::array::from_fn(|k| place[k] - inverse * step[k])
     }
 }

@@ -28,6 +28,12 @@ pub trait Scalar:
     /// entry it is the first one plus `offset`, behind the last one it is the last one, and for NaN the first one. It is
     /// constant between whole numbers, so that its derivative is zero.
     fn look_up(self, table: &'static [f64], offset: usize) -> Self;
+    /// The same number without its derivatives, where it has any: for the steps of an iteration whose last steps give the
+    /// result its derivatives.
+    #[inline]
+    fn still(self) -> Self {
+        self
+    }
     /// Fraction of the diagonal entries of the rows of a constraint: where less than this fraction remains of one row
     /// after the rows before it have been eliminated, the row is left out. At a distance `s` from a position where a
     /// row becomes dependent, `s²` remains of it; an error `φ` of the positions rotates the direction of motion there

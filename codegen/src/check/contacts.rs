@@ -303,7 +303,7 @@ fn tight([a, b]: [&Shape; 2], pair: &Pair, findings: &mut Findings) {
         _ => return,
     };
     // What is not greater than zero was reported.
-    if !(radius > 0.0) {
+    if radius.is_nan() || radius <= 0.0 {
         return;
     }
     let (name, ball, ground) = (quote(&pair.name.value), quote(&ball.name), quote(&ground.name));

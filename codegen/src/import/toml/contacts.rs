@@ -73,7 +73,7 @@ fn special(lower: &str) -> Option<String> {
 fn shape(table: &Table, named: &Named, raw: &mut RawModel, findings: &mut Findings) {
     table.reject_unknown(SHAPE, "a shape", findings);
     let name = table.required_text("name", findings);
-    let kind = kind(table, &SHAPES, |spec| &spec.words, special, findings);
+    let kind = kind(table, SHAPES, |spec| &spec.words, special, findings);
     let word = kind.as_ref().map_or("", |kind| kind.value.word());
     let shape = RawShape {
         name: name.clone().unwrap_or(Spanned::new(String::new(), table.span)),
