@@ -578,8 +578,8 @@ fn the_walker_s_gaits_are_found_by_newton_s_method() {
     }
 }
 
-/// A point that is thrown on hilly ground and slides over it: place, velocity, gravity.
-struct OnHills;
+/// A point or a ball that does not turn, thrown on hilly ground, and slides over it: place, velocity, gravity.
+struct OnHills(&'static str);
 
 impl Family for OnHills {
     fn model(&self) -> Model {
@@ -593,9 +593,10 @@ impl Family for OnHills {
         };
         let slides = [slide("a", "ground", "[1, 0, 0]"), slide("b", "a", "[0, 1, 0]"), slide("c", "b", "[0, 0, 1]")];
         model(&format!(
-            "name = \"thrown\"\ngravity = [0, 0, -9.81]\n{}{ground}[[shape]]\nname = \"foot\"\nbody = \"c\"\ntype = \"point\"\n\
+            "name = \"thrown\"\ngravity = [0, 0, -9.81]\n{}{ground}[[shape]]\nname = \"foot\"\nbody = \"c\"\n{}\n\
              [[contact]]\nname = \"c\"\nbetween = [\"hills\", \"foot\"]\nfriction = 0.2\n",
-            slides.concat()
+            slides.concat(),
+            self.0
         ))
     }
 
@@ -607,7 +608,9 @@ impl Family for OnHills {
 
 /// Landing on a slope and sliding over the cells of the ground.
 #[test]
-fn derivatives_of_a_point_that_slides_over_hills() {
-    let causes = compare(&OnHills, &[-0.8, 0.3, 0.4, 1.5, -0.4, 0.0, 9.81], 0.7, 1e-6);
-    assert_eq!(causes, [Cause::Landed]);
+fn derivatives_of_what_slides_over_hills() {
+    for shape in ["type = \"point\"", "type = \"sphere\"\nradius = 0.2"] {
+        let causes = compare(&OnHills(shape), &[-0.8, 0.3, 0.6, 1.5, -0.4, 0.0, 9.81], 0.7, 1e-6);
+        assert_eq!(causes, [Cause::Landed], "{shape}");
+    }
 }
