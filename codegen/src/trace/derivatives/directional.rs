@@ -71,24 +71,6 @@ impl<'g> Directional<'_, 'g> {
         sweeps.rates(q, p, &inputs, &mut Workspace::new(&tree), &mut v, &mut qd, &mut pd);
         [v, pd]
     }
-    /// Results of [`Output::Derivatives`](crate::output::Output).
-    pub fn derivatives(&self) -> [Vec<Expr<'g>>; 6] {
-        let (plan, given, nv) = (self.plan, self.given, self.plan.dims.nv);
-        let (q, p, params) = (fixed(&given.q), fixed(&given.second), fixed(&given.params));
-        let tree = plan.tree(&given.params);
-        let sweeps = Sweeps { tree: &tree, trace: self.graph };
-        let by_q = |k: usize| {
-            let mut direction = vec![Expr::zero(); plan.dims.nq];
-            sweeps.coordinate_rates(&given.q, &unit(nv, k), &mut direction);
-            slopes(self.along(&moving(&given.q, &direction), &p, &params))
-        };
-        let by_q: Vec<_> = (0..nv).map(by_q).collect();
-        let by_p = |k: usize| slopes(self.along(&q, &moving(&given.second, &unit(nv, k)), &params));
-        let by_p: Vec<_> = (0..nv).map(by_p).collect();
-        let [v, pd] = self.along(&q, &p, &params).map(|x| x.into_iter().map(|x| x.re).collect());
-        let ([dv_dq, dpd_dq], [dv_dp, dpd_dp]) = (rows(&by_q), rows(&by_p));
-        [v, pd, dv_dq, dv_dp, dpd_dq, dpd_dp]
-    }
 
     /// Results of [`Output::ParameterDerivatives`](crate::output::Output).
     pub fn parameter_derivatives(&self) -> [Vec<Expr<'g>>; 2] {
