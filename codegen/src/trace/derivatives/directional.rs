@@ -1,6 +1,5 @@
-//! Derivatives of the rates of mechanisms with constraints: the rates themselves on numbers with derivatives, once for
-//! each direction. Exact, and as long as there are directions; operations that do not depend on the direction are
-//! shared.
+//! Derivatives of the rates of mechanisms with constraints with respect to parameters: the rates themselves on numbers
+//! with derivatives, once for each parameter. Operations that do not depend on the parameter are shared.
 
 use mbd_runtime::sweep::{Inputs, Sweeps};
 use mbd_runtime::workspace::Workspace;

@@ -20,29 +20,30 @@
 //! **Other constraints.** `Φ̇ᵀσ` is their part of `ṗ`, so `Y = Bᵀ + A` and `Z` is its derivative with respect to `σ`.
 //!
 //! **Loops** are treated in the axes of the second frame `B`, with moments about its origin. Let `s_a` be the motion of `B`
-//! relative to `A` at a unit rate of freedom `a`; `Ω_a⁻` and `Ω_a` those of the bodies before and behind its joint relative to
-//! `A`; `f = Σ E σ` the wrench, `E'(s)` the rate of the directions `E` along `s`, `f'`, `f°` the sums of `E'(s_k) σ`, `E'(Ω) σ`
-//! with `Ω` the motion of `B`. A change of `q_k` turns the axis `s_a` if `B` is carried past it (`k` outboard of `a` towards `B`)
-//! or the axis is carried with `A` past `k`: `∂s_a = −s_k × s_a`. So
+//! relative to `A` at a unit rate of freedom `a`, `Ω_a` that of the body before its joint relative to `A`, and `Ω` that of
+//! `B`; `f = Σ E σ` the wrench, `E'(s)` the rate of the directions `E` along `s`, and `f'`, `f°` the sums of `E'(s_k) σ` and
+//! `E'(Ω) σ`. A change of `q_k` turns the axis `s_a` if `B` is carried past it (`k` outboard of `a` towards `B`) or the axis is
+//! carried with `A` past `k`: `∂s_a = −s_k × s_a`. So
 //!
 //! | | |
 //! | --- | --- |
-//! | `A_ak = φ · s_a + f' · s_a` | `φ = s_k × f`, only if `k` turns `a` |
-//! | `R_rk = E_r · (Ω_k⁻ × s_k) + E_r'(s_k) · Ω` | and the decay |
+//! | `A_ak = f' · s_a` | `+ φ · s_a` |
+//! | `C⁺_ak = ∂_k f° · s_a − f' · ((Ω − Ω_a) × s_a)` | `+ χ · s_a + φ · (Ω_a × s_a)` |
 //! | `Z_ar = E_r'(Ω) · s_a − E_r · ((Ω − Ω_a) × s_a)` | |
-//! | `C⁺_ak = χ · s_a + φ · (Ω_a × s_a)` | only if `k` turns `a` |
-//! | `     + ∂_k f° · s_a − f' · ((Ω − Ω_a) × s_a)` | |
+//! | `R_rk = E_r · (Ω_k × s_k) + E_r'(s_k) · Ω` | and the decay |
 //!
-//! with `χ = Ω_k⁻ × φ + s_k × ((Ω − Ω_k⁻) × f + f°)`. Derivatives of `E` are those of dual numbers through the directions of
-//! one loop; most kinds have constant directions.
+//! with `φ = s_k × f` and `χ = Ω_k × φ + s_k × ((Ω − Ω_k) × f + f°)`, which are added only if `k` turns `a`. The joint's own
+//! motion is left out of `Ω_a`: its part is in `ad(v)`. Of two freedoms of different joints, one turns the other and not the
+//! reverse; where the constraint is canonical, `A` and `C⁺` are symmetric between them, and the shorter of the two entries
+//! serves for both. Derivatives of `E` are those of dual numbers through the directions of one loop; most kinds have constant
+//! directions.
 
 use alloc::vec;
 use alloc::vec::Vec;
 use core::mem::take;
 
-use super::dense::pairs;
-use super::pairs::{add, bracket, own_motion};
-use super::{single, velocity, Derivatives};
+use super::pairs::add;
+use super::{velocity, Derivatives};
 use crate::spatial::{dot3, scale3, Force, Motion};
 use crate::sweep::constraint::difference;
 use crate::sweep::jacobian::before;
@@ -66,8 +67,6 @@ struct LoopFreedom<S> {
     axis: Motion<S>,
     /// Motion of the body before the joint, relative to the first frame.
     inner: Motion<S>,
-    /// The same of the body behind the joint.
-    outer: Motion<S>,
 }
 
 impl<S> LoopFreedom<S> {
@@ -85,8 +84,8 @@ impl<S> LoopFreedom<S> {
 pub(super) struct Closed<S> {
     /// Whether a constraint is not canonical.
     mixed: bool,
-    /// `A` of the canonical loops whose wrenches are no momenta of a body, and of those that are not canonical.
-    bend: [Vec<S>; 2],
+    /// `A` of the loops that are not canonical.
+    bend: Vec<S>,
     /// `R`, row by row.
     rows: Vec<S>,
     /// `Y`, where a constraint is not canonical.
@@ -95,8 +94,8 @@ pub(super) struct Closed<S> {
     z: Vec<S>,
     /// `∂σ/∂q` and `∂σ/∂p`, row by row.
     multipliers: [Vec<S>; 2],
-    /// Momenta without those of loops whose wrenches are no momenta of a body; without those that are not canonical.
-    held: [Vec<S>; 2],
+    /// Momenta without those of the loops that are not canonical.
+    held: Vec<S>,
     /// A right-hand side.
     load: Vec<S>,
     /// One multiplier for each row.
@@ -119,12 +118,12 @@ impl<S: Scalar> Closed<S> {
         let rows = tree.dims.rows;
         Closed {
             mixed,
-            bend: [list(nv * nv), list(nv * nv)],
+            bend: list(if mixed { nv * nv } else { 0 }),
             rows: list(rows * nv),
             y: list(if mixed { nv * nv } else { 0 }),
             z: list(if mixed { nv * rows } else { 0 }),
             multipliers: [list(rows * nv), list(rows * nv)],
-            held: [list(nv), list(nv)],
+            held: list(nv),
             load: list(nv),
             sigma: list(rows),
             path: Vec::with_capacity(longest),
@@ -133,8 +132,7 @@ impl<S: Scalar> Closed<S> {
 
     /// Sets all sums to zero.
     pub fn begin(&mut self) {
-        let [a, b] = &mut self.bend;
-        for list in [a, b, &mut self.rows, &mut self.z] {
+        for list in [&mut self.bend, &mut self.rows, &mut self.z] {
             list.fill(S::zero());
         }
     }
@@ -145,7 +143,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     pub(super) fn closed_derivatives(&self, p: &[S], u: &Inputs<S>, w: &mut Workspace<S>, d: &mut Derivatives<S>) {
         self.velocities_of_steps(p, u, w, &mut d.v);
         self.outward(u, w, d);
-        d.closed.held.iter_mut().for_each(|held| held.copy_from_slice(p));
+        d.closed.held.copy_from_slice(p);
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
             self.trace.at(None, Quantity::Derivative);
             match &constraint.bond {
@@ -163,17 +161,15 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             }
         }
         self.joint_momenta(w, d);
-        let held = take(&mut d.closed.held[0]);
-        self.pair_products(&held, u, w, d);
-        d.closed.held[0] = held;
+        self.pair_products(p, u, w, d);
         self.wrench_products(u, w, d);
         self.springs(w, d);
-        self.bend(d);
+        self.other_products(d);
         self.closed_columns(u, w, d);
         self.closed_blocks(d);
-        let held = take(&mut d.closed.held[1]);
+        let held = take(&mut d.closed.held);
         self.own_blocks(&held, d);
-        d.closed.held[1] = held;
+        d.closed.held = held;
     }
 
     /// A joint to the ground: its wrench as a momentum of the body, and its rows of `R`.
@@ -217,15 +213,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             let sign = if second { one } else { -one };
             let axis = scaled(&Motion { lin: [x, y, z], ang: [a, b, c] }, sign);
             let (velocity, rate) = (velocity(node).map(|v| v + k), rates[w.first[i] + k]);
-            path.push(LoopFreedom {
-                node: i,
-                second,
-                velocity,
-                rate,
-                axis,
-                inner: Motion::zero(),
-                outer: Motion::zero(),
-            });
+            path.push(LoopFreedom { node: i, second, velocity, rate, axis, inner: Motion::zero() });
         };
         let at = &w.constraints.relative[index];
         let mut rot = core::array::from_fn(|i| at.axis(i));
@@ -245,10 +233,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             for x in path.iter_mut().filter(own) {
                 motion = motion.plus(&scaled(&x.axis, x.rate));
             }
-            let end = motion;
-            for x in path.iter_mut().filter(own) {
-                (x.inner, x.outer) = if second { (start, end) } else { (end, start) };
-            }
+            let inner = if second { start } else { motion };
+            path.iter_mut().filter(own).for_each(|x| x.inner = inner);
         }
         motion
     }
@@ -288,13 +274,23 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             for a in &path {
                 let Some(v) = a.velocity else { continue };
                 let both = self.tree.nodes[a.node].ratio * ratio;
-                let (mut x, mut c) = (f_k.dot(&a.axis), turning_k.dot(&a.axis) - f_k.dot(&swing(a, &motion)));
-                if a.turned_by(k) {
-                    x = x + phi.dot(&a.axis);
-                    c = c + chi.dot(&a.axis) + phi.dot(&a.outer.cross_motion(&a.axis));
+                let turned = a.turned_by(k);
+                let mirrored = canonical && a.node != k.node;
+                if mirrored && turned {
+                    continue;
                 }
-                add(&mut d.closed.bend[usize::from(!canonical)][v * nv + b], both * x);
+                let (mut x, mut c) = (f_k.dot(&a.axis), turning_k.dot(&a.axis) - f_k.dot(&swing(a, &motion)));
+                if turned {
+                    x = x + phi.dot(&a.axis);
+                    c = c + chi.dot(&a.axis) + phi.dot(&a.inner.cross_motion(&a.axis));
+                }
+                let bend = if canonical { &mut d.b } else { &mut d.closed.bend };
+                add(&mut bend[v * nv + b], both * x);
                 add(&mut d.dpd_dq[v * nv + b], both * c);
+                if mirrored {
+                    add(&mut bend[b * nv + v], both * x);
+                    add(&mut d.dpd_dq[b * nv + v], both * c);
+                }
             }
             let residuals = constraint.decay.map(|decay| {
                 let acts = self.if_acts(constraint.first, decay);
@@ -309,60 +305,34 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for a in &path {
             let Some(v) = a.velocity else { continue };
             let node = &self.tree.nodes[a.node];
-            let momentum = node.ratio * f.dot(&a.axis);
             let swing = swing(a, &motion);
             add(&mut d.pd[v], node.ratio * (turning.dot(&a.axis) - f.dot(&swing)));
-            d.closed.held[0][v] = d.closed.held[0][v] - momentum;
             if canonical {
                 continue;
             }
-            d.closed.held[1][v] = d.closed.held[1][v] - momentum;
+            add(&mut d.closed.held[v], -(node.ratio * f.dot(&a.axis)));
             for (r, row) in constraint.range().enumerate() {
                 let x = rates[r].dot(&a.axis) - directions(r).dot(&swing);
                 add(&mut d.closed.z[v * rows + row], node.ratio * x);
-            }
-            // ad(v) acts on the momentum without these rows.
-            let Some(first) = velocity(node).filter(|_| !single(node)) else { continue };
-            let own = own_motion(node, &d.v[first..]);
-            for c in path.iter().filter(|c| c.second == a.second && c.node == a.node) {
-                let Some(to) = c.velocity else { continue };
-                let turned = bracket(&node.kind, &own, v - first, to - first);
-                for (r, row) in constraint.range().enumerate() {
-                    add(&mut d.closed.z[v * rows + row], -(turned * directions(r).dot(&c.axis)));
-                }
             }
         }
         d.closed.path = path;
     }
 
-    /// `B⁺`, `C⁺`, `Y` and `Z` put together.
-    fn bend(&self, d: &mut Derivatives<S>) {
+    /// `Y`, `Z` and the rest of `B⁺`, where a constraint is not canonical.
+    fn other_products(&self, d: &mut Derivatives<S>) {
         let (nv, rows) = (self.tree.dims.nv, self.tree.dims.rows);
-        self.trace.at(None, Quantity::Derivative);
-        let Derivatives { closed, b, dpd_dq, .. } = d;
-        for node in &self.tree.nodes {
-            let Some(v) = velocity(node).filter(|_| !single(node)) else { continue };
-            let own = own_motion(node, &d.v[v..]);
-            for (x, y) in pairs(node) {
-                let turned = bracket(&node.kind, &own, x, y);
-                for c in 0..nv {
-                    let bend = closed.bend[0][(v + y) * nv + c] + closed.bend[1][(v + y) * nv + c];
-                    add(&mut dpd_dq[(v + x) * nv + c], -(turned * bend));
-                }
-            }
-        }
-        for (b, bend) in b.iter_mut().zip(&closed.bend[0]) {
-            *b = *b + *bend;
-        }
+        let Derivatives { closed, b, .. } = d;
         if !closed.mixed {
             return;
         }
+        self.trace.at(None, Quantity::Derivative);
         for x in 0..nv {
             for c in 0..nv {
-                closed.y[x * nv + c] = b[c * nv + x] + closed.bend[1][x * nv + c];
+                closed.y[x * nv + c] = b[c * nv + x] + closed.bend[x * nv + c];
             }
         }
-        for (b, bend) in b.iter_mut().zip(&closed.bend[1]) {
+        for (b, bend) in b.iter_mut().zip(&closed.bend) {
             *b = *b + *bend;
         }
         for constraint in self.tree.constraints.iter().filter(|c| c.canonical()) {
@@ -438,7 +408,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
 /// `(Ω − Ω_a) × s_a`, with the motion `Ω` of the second frame.
 fn swing<S: Scalar>(a: &LoopFreedom<S>, motion: &Motion<S>) -> Motion<S> {
-    difference(motion, &a.outer).cross_motion(&a.axis)
+    difference(motion, &a.inner).cross_motion(&a.axis)
 }
 
 fn scaled<S: Scalar>(m: &Motion<S>, x: S) -> Motion<S> {

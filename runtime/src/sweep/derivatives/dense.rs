@@ -207,7 +207,7 @@ fn product<S: Scalar>(h: &[S], x: impl Iterator<Item = S>) -> S {
 }
 
 /// Pairs of a node's own freedoms.
-pub(super) fn pairs<S: Scalar>(node: &Node<S>) -> impl Iterator<Item = (usize, usize)> {
+fn pairs<S: Scalar>(node: &Node<S>) -> impl Iterator<Item = (usize, usize)> {
     let n = node.kind.nv();
     (0..n).flat_map(move |a| (0..n).map(move |b| (a, b)))
 }

@@ -29,6 +29,9 @@
 //! B`. `BᵀY` is symmetric and formed by halves; `G` and `ad` are small blocks: damping on the diagonal of `G`, and
 //! where velocities are not coordinate rates the commutators of the joint's own axes, `ad(v)_ab = (v × e_a)_b`, `G_ab =
 //! (e_b × e_a) · π`. Without those, `∂ṗ/∂p = −(∂v/∂q)ᵀ`: the canonical symmetry.
+//!
+//! Mechanisms with loops and couplings take the same `B` and `C`, and solve with the matrix that the rates have factored
+//! (`closed.rs`).
 
 mod closed;
 mod dense;

@@ -24,7 +24,7 @@ pub struct Derivatives<S> {
     pub pd: Vec<S>,
     /// `∂v/∂q`.
     pub dv_dq: Vec<S>,
-    /// `∂v/∂p`, symmetric: the inverse of the mass matrix.
+    /// `∂v/∂p`, symmetric: the inverse of the mass matrix, of the constrained one where there are constraints.
     pub dv_dp: Vec<S>,
     /// `∂ṗ/∂q`.
     pub dpd_dq: Vec<S>,
