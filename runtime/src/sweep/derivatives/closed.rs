@@ -43,7 +43,7 @@ use alloc::vec::Vec;
 use core::mem::take;
 
 use super::pairs::add;
-use super::{velocity, Derivatives};
+use super::{single, velocity, Derivatives};
 use crate::spatial::{dot3, scale3, Force, Motion};
 use crate::sweep::constraint::difference;
 use crate::sweep::jacobian::before;
@@ -67,6 +67,10 @@ struct LoopFreedom<S> {
     axis: Motion<S>,
     /// Motion of the body before the joint, relative to the first frame.
     inner: Motion<S>,
+    /// The same of the body behind the joint.
+    outer: Motion<S>,
+    /// `(Ω_outer − Ω_inner) × s`: zero, and known to be, where the joint has no other freedom.
+    twist: Motion<S>,
 }
 
 impl<S> LoopFreedom<S> {
@@ -76,6 +80,30 @@ impl<S> LoopFreedom<S> {
             true => other.second && other.node > self.node,
             false => other.second || other.node <= self.node,
         }
+    }
+}
+
+/// Of the motions before and behind a joint with one freedom, either serves in products with its axis: that one is taken
+/// which is known to be zero at an end of the loop.
+impl<S: Scalar> LoopFreedom<S> {
+    /// `Ω_a × s_a`.
+    fn turn(&self) -> Motion<S> {
+        match self.second {
+            true => self.inner.cross_motion(&self.axis),
+            false => difference(&self.outer.cross_motion(&self.axis), &self.twist),
+        }
+    }
+
+    /// `(Ω − Ω_a) × s_a`, with the motion `Ω` of the second frame.
+    fn swing(&self, motion: &Motion<S>) -> Motion<S> {
+        difference(motion, &self.outer).cross_motion(&self.axis).plus(&self.twist)
+    }
+
+    /// `χ`, with the motion of the second frame, `f`, `f°` and `φ`.
+    fn chi(&self, motion: &Motion<S>, f: &Force<S>, turning: &Force<S>, phi: &Force<S>) -> Force<S> {
+        let ahead = difference(motion, &self.outer).cross_force(f).plus(turning);
+        let all = self.outer.cross_force(phi).plus(&self.axis.cross_force(&ahead));
+        all.minus(&self.twist.cross_force(f))
     }
 }
 
@@ -213,7 +241,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             let sign = if second { one } else { -one };
             let axis = scaled(&Motion { lin: [x, y, z], ang: [a, b, c] }, sign);
             let (velocity, rate) = (velocity(node).map(|v| v + k), rates[w.first[i] + k]);
-            path.push(LoopFreedom { node: i, second, velocity, rate, axis, inner: Motion::zero() });
+            let (inner, outer, twist) = (Motion::zero(), Motion::zero(), Motion::zero());
+            path.push(LoopFreedom { node: i, second, velocity, rate, axis, inner, outer, twist });
         };
         let at = &w.constraints.relative[index];
         let mut rot = core::array::from_fn(|i| at.axis(i));
@@ -228,13 +257,17 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let sides = [(false, &cut.path_a), (true, &cut.path_b)];
         let order = sides[0].1.iter().rev().map(|i| (false, *i)).chain(sides[1].1.iter().map(|i| (true, *i)));
         for (second, i) in order {
+            let here = |x: &&mut LoopFreedom<S>| x.second == second && x.node == i;
+            let rates = path.iter_mut().filter(here).map(|x| scaled(&x.axis, x.rate));
+            let own = rates.fold(Motion::zero(), |sum, rate| sum.plus(&rate));
             let start = motion;
-            let own = |x: &&mut LoopFreedom<S>| x.second == second && x.node == i;
-            for x in path.iter_mut().filter(own) {
-                motion = motion.plus(&scaled(&x.axis, x.rate));
+            motion = motion.plus(&own);
+            let (inner, outer, own) = if second { (start, motion, own) } else { (motion, start, scaled(&own, -one)) };
+            let several = !single(&self.tree.nodes[i]);
+            for x in path.iter_mut().filter(here) {
+                (x.inner, x.outer) = (inner, outer);
+                x.twist = if several { own.cross_motion(&x.axis) } else { Motion::zero() };
             }
-            let inner = if second { start } else { motion };
-            path.iter_mut().filter(own).for_each(|x| x.inner = inner);
         }
         motion
     }
@@ -264,13 +297,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for k in &path {
             let Some(b) = k.velocity else { continue };
             let ratio = self.tree.nodes[k.node].ratio;
-            let psi = k.inner.cross_motion(&k.axis);
+            let psi = k.turn();
             let turned = closure.direction_rates(at, &k.axis);
             let bent = closure.bent_rates(at, &motion, &k.axis, &psi);
             let (f_k, turning_k) = (wrench(&|r| turned[r]), wrench(&|r| bent[r]));
             let phi = k.axis.cross_force(&f);
-            let ahead = difference(&motion, &k.inner).cross_force(&f).plus(&turning);
-            let chi = k.inner.cross_force(&phi).plus(&k.axis.cross_force(&ahead));
+            let chi = k.chi(&motion, &f, &turning, &phi);
             for a in &path {
                 let Some(v) = a.velocity else { continue };
                 let both = self.tree.nodes[a.node].ratio * ratio;
@@ -279,10 +311,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 if mirrored && turned {
                     continue;
                 }
-                let (mut x, mut c) = (f_k.dot(&a.axis), turning_k.dot(&a.axis) - f_k.dot(&swing(a, &motion)));
+                let (mut x, mut c) = (f_k.dot(&a.axis), turning_k.dot(&a.axis) - f_k.dot(&a.swing(&motion)));
                 if turned {
                     x = x + phi.dot(&a.axis);
-                    c = c + chi.dot(&a.axis) + phi.dot(&a.inner.cross_motion(&a.axis));
+                    c = c + chi.dot(&a.axis) + phi.dot(&a.turn());
                 }
                 let bend = if canonical { &mut d.b } else { &mut d.closed.bend };
                 add(&mut bend[v * nv + b], both * x);
@@ -305,7 +337,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for a in &path {
             let Some(v) = a.velocity else { continue };
             let node = &self.tree.nodes[a.node];
-            let swing = swing(a, &motion);
+            let swing = a.swing(&motion);
             add(&mut d.pd[v], node.ratio * (turning.dot(&a.axis) - f.dot(&swing)));
             if canonical {
                 continue;
@@ -404,11 +436,6 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             }
         }
     }
-}
-
-/// `(Ω − Ω_a) × s_a`, with the motion `Ω` of the second frame.
-fn swing<S: Scalar>(a: &LoopFreedom<S>, motion: &Motion<S>) -> Motion<S> {
-    difference(motion, &a.inner).cross_motion(&a.axis)
 }
 
 fn scaled<S: Scalar>(m: &Motion<S>, x: S) -> Motion<S> {
