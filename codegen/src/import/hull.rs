@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::mesh::Problem;
-use super::source::{Findings, Spanned};
+use super::source::{Findings, Span, Spanned};
 use super::words::quote;
 use crate::model::Origin;
 
@@ -49,7 +49,7 @@ pub(crate) fn corners(points: &[[f64; 3]], most: usize) -> Result<Corners, Strin
 }
 
 #[cfg(not(feature = "hulls"))]
-const WITHOUT: &str = "this program was built without the feature `hulls`";
+pub(crate) const WITHOUT: &str = "this program was built without the feature `hulls`";
 
 /// The points of a mesh, scaled, m.
 ///
@@ -61,10 +61,19 @@ pub(crate) fn of_mesh(path: &Path, bytes: &[u8], scale: [f64; 3]) -> Result<Vec<
     for point in &mut points {
         (0..3).for_each(|k| point[k] *= scale[k]);
     }
+    near(points).map_err(Problem::whole)
+}
+
+/// Points of a mechanism, m.
+///
+/// # Errors
+/// Some are too far away, or not finite.
+#[cfg(feature = "hulls")]
+pub(crate) fn near(points: Vec<[f64; 3]>) -> Result<Vec<[f64; 3]>, String> {
     let near = |point: &[f64; 3]| point.iter().all(|x| x.abs() <= FARTHEST);
     match points.iter().filter(|point| !near(point)).count() {
         0 => Ok(points),
-        n => Err(Problem::whole(format!("{n} of its points are farther away than {FARTHEST:e} m"))),
+        n => Err(format!("{n} of its points are farther away than {FARTHEST:e} m")),
     }
 }
 
@@ -114,6 +123,55 @@ impl Corners {
             (Some(_), false) => Some(format!("{source} their hull has {n} corners")),
             (Some(_), true) => Some(format!("{source} {n} of them are used, and {}", outside(self.depth))),
         }
+    }
+}
+
+/// What is said once of all meshes that became hulls.
+#[derive(Debug)]
+pub(crate) struct Told {
+    count: usize,
+    /// Number of those with points outside.
+    reduced: usize,
+    /// How far these lie outside, m.
+    depth: f64,
+    /// Place of the first.
+    first: Span,
+}
+
+impl Default for Told {
+    fn default() -> Self {
+        Told { count: 0, reduced: 0, depth: 0.0, first: Span::FILE }
+    }
+}
+
+impl Told {
+    /// Counts a hull, and what it loses if it is the first of its mesh.
+    pub fn add(&mut self, at: Span, corners: Option<&Corners>) {
+        if self.count == 0 {
+            self.first = at;
+        }
+        self.count += 1;
+        if let Some(depth) = corners.map(|corners| corners.depth).filter(|depth| *depth > 0.0) {
+            (self.reduced, self.depth) = (self.reduced + 1, self.depth.max(depth));
+        }
+    }
+
+    /// Says how many there are.
+    pub fn tell(&self, findings: &mut Findings) {
+        let meshes = match self.count {
+            0 => return,
+            1 => "1 mesh is a hull".to_string(),
+            n => format!("{n} meshes are hulls"),
+        };
+        let outside = match self.reduced {
+            0 => String::new(),
+            n => format!(
+                "; of {n}, {} points are used, and the others lie up to {} outside of their hull",
+                MOST.2,
+                millimetres(self.depth)
+            ),
+        };
+        findings.notice(self.first, format!("{meshes} for contacts{outside}"));
     }
 }
 

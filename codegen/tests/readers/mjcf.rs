@@ -3,7 +3,7 @@
 use std::io::{Error, ErrorKind};
 use std::path::Path;
 
-use mbd_codegen::model::{ConstraintKind, Gravity, JointKind, LoopKind, Model, Rotation, Value};
+use mbd_codegen::model::{ConstraintKind, Gravity, JointKind, LoopKind, Model, Rotation, ShapeKind, Value};
 use mbd_codegen::read::{load_with, to_toml, Base, Floor, ImportOptions};
 
 /// Files that can be included or changed.
@@ -352,6 +352,49 @@ fn ranges_are_stops_and_geoms_touch_where_that_is_asked_for() {
     assert_eq!((m.contacts.len(), m.shapes.len()), (10, 3));
     let (_, findings) = load("m.xml", text, &ImportOptions { base: Base::Floating, ..ImportOptions::default() });
     assert!(findings.contains("error: a model of MuJoCo states its own base"), "{findings}");
+}
+
+/// Where there is a floor, meshes of moving bodies touch it with the corners of their hulls, placed as MuJoCo places the
+/// vertices.
+#[test]
+fn meshes_touch_the_floor() {
+    let asset = "<compiler meshdir='meshes'/><asset><mesh file='corner.obj' scale='1 -2 1' refpos='0 0 1'/>\
+        <mesh name='m' file='corner.msh'/><mesh name='none' file='none.stl'/>\
+        <mesh name='box' vertex='0 0 0  1 0 0  0 1 0  1 1 0  0 0 1  1 0 1  0 1 1  1 1 1  0.5 0.5 0.5'/></asset>";
+    let text = format!(
+        "<mujoco>{asset}<worldbody><geom type='mesh' mesh='m'/><body name='a'><freejoint/>\
+         <inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>\
+         <geom name='first' type='mesh' mesh='corner' pos='0 0 5'/><geom type='mesh' mesh='m'/><geom type='mesh' mesh='m'/>\
+         <geom type='mesh' mesh='box'/><geom type='mesh' mesh='none'/><geom type='mesh' mesh='none'/>\
+         <geom type='mesh' mesh='m' contype='0' conaffinity='0'/></body></worldbody></mujoco>"
+    );
+    let floor = Some(Floor { height: -1.0, friction: 0.5 });
+    let (m, findings) = load("robots/m.xml", &text, &ImportOptions { floor, ..ImportOptions::default() });
+    let m = m.expect(&findings);
+    let hulls = m.shapes.iter().filter_map(|shape| match &shape.kind {
+        ShapeKind::Hull { points } => Some((shape.name.as_str(), points.len())),
+        _ => None,
+    });
+    let hulls: Vec<_> = hulls.collect();
+    assert_eq!(hulls, [("first", 4), ("a", 4), ("a_shape_2", 4), ("a_shape_3", 8)]);
+    assert_eq!(m.contacts.len(), 4 + 4 + 4 + 8);
+    let first = m.shapes.iter().find(|shape| shape.name == "first").expect("a shape");
+    let ShapeKind::Hull { points } = &first.kind else { panic!("no hull") };
+    for corner in [[0.0, 0.0, -1.0], [1.0, 0.0, -1.0], [0.0, -2.0, -1.0], [0.0; 3]] {
+        assert!(points.contains(&corner), "{points:?}");
+    }
+    assert_eq!(first.mount.placement.xyz.map(x), [0.0, 0.0, 5.0]);
+    for wanted in [
+        "notice: 4 meshes are hulls for contacts",
+        "warning: mesh `none`: cannot read `none.stl`",
+        "notice: the mesh of a `geom` is not used for contacts: those of moving bodies are",
+    ] {
+        assert_eq!(findings.matches(wanted).count(), 1, "{wanted}\n{findings}");
+    }
+    // Without a floor, no file is read.
+    let (m, findings) = load("robots/m.xml", &text, &ImportOptions::default());
+    assert!(m.expect(&findings).shapes.is_empty());
+    assert!(findings.contains("those of moving bodies are, where a floor is asked for (7 times"), "{findings}");
 }
 
 #[test]

@@ -90,8 +90,10 @@ pub(super) fn all<'d>(
             (part, geom::read(reader, part, rules.compiler, &whose))
         });
         let geoms: Vec<(&Part, Geom)> = read.filter_map(|(part, geom)| Some((part, geom?))).collect();
+        let of_meshes = (k > 0 && raw.floor.is_some()).then_some(meshes);
         for (part, geom) in &geoms {
-            raw.shapes.extend(geom.shape(reader, &part.element, &built.names[k], &mut built.shape_names));
+            let from = (&part.element, of_meshes);
+            raw.shapes.extend(geom.shape(reader, from, &built.names[k], &mut built.shape_names));
         }
         if k > 0 {
             let mut geoms: Vec<Geom> = geoms.into_iter().map(|(_, geom)| geom).collect();

@@ -8,7 +8,7 @@ use super::pose::{between, pose, raw_vec, Pose};
 use super::settings::Compiler;
 use super::tree::Part;
 use crate::diag::Severity;
-use crate::import::raw::{RawNumber, RawShape};
+use crate::import::raw::{RawHull, RawNumber, RawShape};
 use crate::import::source::{Span, Spanned};
 use crate::import::taken::{Taken, CORNERS};
 use crate::import::words::quote;
@@ -260,29 +260,46 @@ impl Geom<'_> {
         }
     }
 
-    /// The shape for contacts; `None` where it touches nothing.
+    /// The shape for contacts, that of a mesh where `meshes` are given; `None` where it touches nothing.
     pub fn shape(
         &self,
         reader: &mut Reader,
-        element: &Element,
+        (element, meshes): (&Element, Option<&Meshes>),
         body: &Spanned<String>,
         taken: &mut Taken,
     ) -> Option<RawShape> {
         if !self.touches {
             return None;
         }
-        if self.mesh.is_some() || ["mesh", "sdf", "hfield"].contains(&self.kind) {
-            reader.tally.notice(self.span, "shapes of meshes and height fields are not used for contacts");
-            return None;
-        }
+        let corners = match (self.unread(), &self.mesh, meshes) {
+            (Some(_), ..) => {
+                let message =
+                    "shapes of height fields, of signed distance fields and of primitives that are fitted to \
+                               meshes are not used for contacts";
+                reader.tally.notice(self.span, message);
+                return None;
+            }
+            (None, Some(_), None) => {
+                let message =
+                    "the mesh of a `geom` is not used for contacts: those of moving bodies are, where a floor \
+                               is asked for";
+                reader.tally.notice(self.span, message);
+                return None;
+            }
+            (None, Some(mesh), Some(meshes)) => Some(meshes.hull(reader, mesh)?),
+            (None, None, _) => None,
+        };
         let span = self.span;
         let number = |x: f64| Some(RawNumber::constant(x, span));
         let [a, b, c] = self.size;
-        let kind = SHAPES.iter().find(|spec| spec.word() == self.kind)?;
-        let name = taken.shape(element.name().map_or(body.value.as_str(), |name| name.value), CORNERS);
+        let word = if corners.is_some() { "hull" } else { self.kind };
+        let kind = SHAPES.iter().find(|spec| spec.word() == word)?;
+        let contacts = corners.as_ref().map_or(CORNERS, Vec::len);
+        let name = taken.shape(element.name().map_or(body.value.as_str(), |name| name.value), contacts);
         let name = Spanned::new(name, element.name().map_or(span, |name| name.span));
         let mut shape = RawShape::new(name, Some(Spanned::new(kind, span)));
         (shape.body, shape.placement) = (Some(body.clone()), self.pose.raw(span));
+        shape.hull = corners.map(|corners| RawHull { keys: vec![("file", span)], corners: Some(corners) });
         match self.kind {
             "sphere" => shape.radius = number(a),
             "capsule" | "cylinder" => (shape.radius, shape.length) = (number(a), number(2.0 * b)),

@@ -1,4 +1,4 @@
-//! `mesh`: volumes and inertias of meshes, from STL, OBJ and MSH files or from the vertices in the file itself.
+//! `mesh`: volumes, inertias and hulls of meshes, from STL, OBJ and MSH files or from the vertices in the file itself.
 
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::classes::{Classes, MAIN};
 use super::element::{choice, flag, numbers, parsed, vec3, Element};
 use super::pose::{normalised, rotate, Pose, Quat, NONE};
+use crate::import::hull::{self, Told};
 use crate::import::mesh::{self, corners, msh, stl, Triangle, MOST};
 use crate::import::source::Spanned;
 use crate::import::words::quote;
@@ -62,6 +63,9 @@ pub(super) struct Meshes<'m, 'd> {
     all: HashMap<String, Element<'d>>,
     /// What was read; `None` where something was reported.
     read: RefCell<HashMap<String, Option<Solid>>>,
+    /// Corners of hulls; `None` where something was reported.
+    hulls: RefCell<HashMap<String, Option<Vec<[f64; 3]>>>>,
+    told: RefCell<Told>,
     folder: PathBuf,
     files: ReadFile<'m>,
 }
@@ -89,7 +93,7 @@ impl<'m, 'd> Meshes<'m, 'd> {
             all.insert(name, element);
         }
         let folder = if strip { PathBuf::new() } else { main.parent().unwrap_or(Path::new("")).join(folder) };
-        Meshes { all, read: RefCell::default(), folder, files }
+        Meshes { all, read: RefCell::default(), hulls: RefCell::default(), told: RefCell::default(), folder, files }
     }
 
     /// The body that a mesh bounds; `None` where something was reported, once for each mesh.
@@ -97,16 +101,69 @@ impl<'m, 'd> Meshes<'m, 'd> {
         if let Some(known) = self.read.borrow().get(name.value) {
             return *known;
         }
-        let solid = match self.all.get(name.value) {
-            Some(element) => self.of_asset(reader, element, name.value),
-            None => {
-                let message = format!("{} is not a mesh", quote(name.value));
-                reader.findings.error(name.span, message, "add it to `asset`");
-                None
-            }
-        };
+        let solid = self.asset(reader, name).and_then(|element| self.of_asset(reader, element, name.value));
         self.read.borrow_mut().insert(name.value.to_string(), solid);
         solid
+    }
+
+    /// The element of a mesh; `None` where there is none, which is reported.
+    fn asset(&self, reader: &mut Reader, name: &Spanned<&str>) -> Option<&Element<'d>> {
+        let found = self.all.get(name.value);
+        if found.is_none() {
+            let message = format!("{} is not a mesh", quote(name.value));
+            reader.findings.error(name.span, message, "add it to `asset`");
+            // It is reported once.
+            self.read.borrow_mut().insert(name.value.to_string(), None);
+        }
+        found
+    }
+
+    /// The corners of the hull of a mesh, in the axes of the mesh, m; `None` where something was reported, once for each
+    /// mesh.
+    pub fn hull(&self, reader: &mut Reader, name: &Spanned<&str>) -> Option<Vec<[f64; 3]>> {
+        if let Some(known) = self.hulls.borrow().get(name.value) {
+            if known.is_some() {
+                self.told.borrow_mut().add(name.span, None);
+            }
+            return known.clone();
+        }
+        let corners = self.asset(reader, name).and_then(|element| match self.points(reader, element, name.value) {
+            Ok(corners) => {
+                self.told.borrow_mut().add(name.span, Some(&corners));
+                Some(corners.corners)
+            }
+            Err(problem) => {
+                let at = element.attribute("file").map_or(place(element.node), |file| file.span);
+                let message = format!("mesh {}: {problem}; its geoms touch nothing", quote(name.value));
+                reader.findings.warning(at, message, "give the body geoms of a primitive type for contacts");
+                None
+            }
+        });
+        self.hulls.borrow_mut().insert(name.value.to_string(), corners.clone());
+        corners
+    }
+
+    #[cfg(feature = "hulls")]
+    fn points(&self, reader: &mut Reader, element: &Element, name: &str) -> Result<hull::Corners, String> {
+        let whose = format!("mesh {}: ", quote(name));
+        let frame = Frame::read(reader, element, &whose);
+        // A mesh of vertices alone is a hull to MuJoCo too.
+        let points = match (element.attribute("file"), element.attribute("vertex")) {
+            (None, Some(text)) => vertices(reader, &text, &whose)?,
+            _ => self.triangles(reader, element, &whose)?.into_flattened(),
+        };
+        let points = points.into_iter().map(|v| frame.point(v)).collect();
+        hull::corners(&hull::near(points)?, hull::MOST.2)
+    }
+
+    #[cfg(not(feature = "hulls"))]
+    fn points(&self, _: &mut Reader, _: &Element, _: &str) -> Result<hull::Corners, String> {
+        Err(hull::WITHOUT.into())
+    }
+
+    /// Says how many hulls there are.
+    pub fn tell(&self, reader: &mut Reader) {
+        self.told.borrow().tell(reader.findings);
     }
 
     fn of_asset(&self, reader: &mut Reader, element: &Element, name: &str) -> Option<Solid> {
@@ -186,18 +243,24 @@ impl Frame {
 
 /// Vertices and faces that stand in the file.
 fn inline(reader: &mut Reader, element: &Element, whose: &str) -> Result<Vec<Triangle>, String> {
-    let (Some(vertices), Some(faces)) = (element.attribute("vertex"), element.attribute("face")) else {
+    let (Some(vertex), Some(face)) = (element.attribute("vertex"), element.attribute("face")) else {
         return Err("a mesh without `file`, or without `face`, is not read".into());
     };
-    let mut all = |text: &Spanned<&str>, key| {
-        let all = parsed(reader, text, key, 3..=9 * MOST, whose);
-        all.map(|all| all.value).ok_or_else(|| format!("its `{key}` is not read"))
-    };
-    let (vertices, faces) = (all(&vertices, "vertex")?, all(&faces, "face")?);
-    // MuJoCo keeps vertices in single precision.
-    let vertices: Vec<[f64; 3]> = vertices.chunks_exact(3).map(|v| [0, 1, 2].map(|k| f64::from(v[k] as f32))).collect();
+    let (vertices, faces) = (vertices(reader, &vertex, whose)?, list(reader, &face, "face", whose)?);
     let faces = faces.chunks_exact(3).map(|f| [0, 1, 2].map(|k| if f[k] >= 0.0 { f[k] as usize } else { usize::MAX }));
     corners(&vertices, faces)
+}
+
+/// The numbers of an attribute.
+fn list(reader: &mut Reader, text: &Spanned<&str>, key: &str, whose: &str) -> Result<Vec<f64>, String> {
+    let all = parsed(reader, text, key, 3..=9 * MOST, whose);
+    all.map(|all| all.value).ok_or_else(|| format!("its `{key}` is not read"))
+}
+
+/// Vertices that stand in the file. MuJoCo keeps them in single precision.
+fn vertices(reader: &mut Reader, text: &Spanned<&str>, whose: &str) -> Result<Vec<[f64; 3]>, String> {
+    let all = list(reader, text, "vertex", whose)?;
+    Ok(all.chunks_exact(3).map(|v| [0, 1, 2].map(|k| f64::from(v[k] as f32))).collect())
 }
 
 /// The triangles of an OBJ file. MuJoCo keeps vertices in single precision.

@@ -131,6 +131,7 @@ fn read_mujoco<'d>(
     let rules = Rules { compiler: &compiler, options: &settings, stops: options.limits };
     let meshes = Meshes::new(reader, &called("asset"), &called("compiler"), &classes, files);
     let mut built = build::all(reader, &bodies, rules, (&meshes, shapes), &mut raw);
+    meshes.tell(reader);
     touching(reader, root, options, &raw);
     let mut tendons = HashMap::new();
     for section in called("tendon") {
@@ -186,7 +187,7 @@ fn touching(reader: &mut Reader, root: Node, options: &ImportOptions, raw: &RawM
             }
         }
         Some(_) if !of_bodies(raw) => {
-            let help = "give its bodies geoms of a primitive type with a `contype`; or leave the floor out";
+            let help = "give its bodies geoms of a primitive type, or meshes, with a `contype`; or leave the floor out";
             reader.findings.warning(place(root), "nothing touches the floor: no shape of a body was read", help);
         }
         Some(_) => {}

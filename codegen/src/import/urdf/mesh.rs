@@ -4,8 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::shape::{numbers, Unread};
-use crate::import::hull::{self, millimetres, Corners};
-use crate::import::source::Span;
+use crate::import::hull::{self, Told};
 use crate::import::words::quote;
 use crate::import::xml::{place, Reader};
 use crate::import::ReadFile;
@@ -27,8 +26,7 @@ pub(super) struct Meshes<'m> {
     files: ReadFile<'m>,
     /// Hulls by the names of files, with their scales.
     known: HashMap<(String, [u64; 3]), Vec<[f64; 3]>>,
-    /// Number of hulls, and of those with points outside; how far these lie outside, m; place of the first hull.
-    told: (usize, usize, f64, Span),
+    told: Told,
 }
 
 impl<'m> Meshes<'m> {
@@ -40,7 +38,7 @@ impl<'m> Meshes<'m> {
             let last = &folders[folders.len() - 1];
             folders.push(last.join(".."));
         }
-        Meshes { folders, files, known: HashMap::new(), told: (0, 0, 0.0, Span::FILE) }
+        Meshes { folders, files, known: HashMap::new(), told: Told::default() }
     }
 
     /// The corners of the hull of a mesh.
@@ -62,7 +60,7 @@ impl<'m> Meshes<'m> {
         }
         let key = (name.to_string(), scale.map(f64::to_bits));
         if let Some(known) = self.known.get(&key) {
-            self.told.0 += 1;
+            self.told.add(at, None);
             return Ok(known.clone());
         }
         let found = self.paths(name).into_iter().find_map(|path| (self.files)(&path).ok().map(|bytes| (path, bytes)));
@@ -72,10 +70,9 @@ impl<'m> Meshes<'m> {
             let line = first.filter(|p| p.line > 0).map_or(String::new(), |p| format!("line {}: ", p.line));
             faulty(format!("{}: {line}{}", quote(name), first.map_or("", |p| &p.message)))
         })?;
-        let Corners { corners, depth, .. } = hull::corners(&points, hull::MOST.2).map_err(faulty)?;
-        let (count, reduced, most, first) = self.told;
-        let first = if count == 0 { at } else { first };
-        self.told = (count + 1, reduced + usize::from(depth > 0.0), most.max(depth), first);
+        let corners = hull::corners(&points, hull::MOST.2).map_err(faulty)?;
+        self.told.add(at, Some(&corners));
+        let corners = corners.corners;
         self.known.insert(key, corners.clone());
         Ok(corners)
     }
@@ -98,19 +95,6 @@ impl<'m> Meshes<'m> {
 
     /// Says how many there are.
     pub fn tell(self, reader: &mut Reader) {
-        let (count, reduced, depth, first) = self.told;
-        if count == 0 {
-            return;
-        }
-        let meshes = if count == 1 { "1 mesh is a hull" } else { &format!("{count} meshes are hulls") };
-        let most = hull::MOST.2;
-        let outside = match reduced {
-            0 => String::new(),
-            n => format!(
-                "; of {n}, {most} points are used, and the others lie up to {} outside of their hull",
-                millimetres(depth)
-            ),
-        };
-        reader.findings.notice(first, format!("{meshes} for contacts{outside}"));
+        self.told.tell(reader.findings);
     }
 }
