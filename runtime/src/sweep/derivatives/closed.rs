@@ -11,11 +11,11 @@
 //!
 //! Rows that are left out as redundant have no multiplier, here as in the rates.
 //!
-//! **Canonical constraints.** Where `ṗ` is that of `L = ½ vᵀM v + σᵀΦ v`, `Y = B⁺ᵀ` and `Z = Rᵀ`: then `∂ṗ/∂p = Yᵀ + ...`
-//! is the canonical symmetry as for trees, and `∂ṗ/∂q` is symmetric and formed by halves, without `∂σ/∂p`. This holds for
-//! rows that are the derivatives of residuals at all poses, for couplings, and for joints to the ground, whose rows are
-//! constants in a body: their wrench `E σ` is a momentum that is fixed to this body. It is added to `P*`, and the sweeps
-//! over pairs of joints take it with all other momenta.
+//! **Canonical constraints.** Where `ṗ` is that of `L = ½ vᵀM v + σᵀΦ v`, `Y = B⁺ᵀ` and `Z = Rᵀ`: then `∂ṗ/∂p` is
+//! `−(∂v/∂q)ᵀ` with what single joints add, as for trees, and `∂ṗ/∂q` is symmetric and formed by halves, without
+//! `∂σ/∂p`. This holds for rows that are the derivatives of residuals at all poses, for couplings, and for joints to the
+//! ground, whose rows are constants in a body: their wrench `E σ` is a momentum that is fixed to this body. It is added
+//! to `P*`, and the sweeps over pairs of joints take it with all other momenta.
 //!
 //! **Other constraints.** `Φ̇ᵀσ` is their part of `ṗ`, so `Y = Bᵀ + A` and `Z` is its derivative with respect to `σ`.
 //!
