@@ -1,6 +1,5 @@
 //! The interpreter: it runs the sweeps directly on numbers, for any tree.
 
-mod directions;
 mod rank;
 mod system;
 
@@ -9,7 +8,6 @@ use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use directions::DualRun;
 pub use rank::MassMatrixError;
 
 use crate::sweep::{Derivatives, FrameState, Inputs, Plain, Sweeps};
@@ -68,8 +66,6 @@ pub struct Interpreter<S> {
     neutral: Vec<S>,
     /// Made when [`Differentiable::rate_derivatives`] is first called.
     derivatives: Option<Box<Derivatives<S>>>,
-    /// The same, for mechanisms with constraints.
-    dual: Option<Box<DualRun<S>>>,
 }
 
 impl<S: Scalar> Interpreter<S> {
@@ -120,7 +116,6 @@ impl<S: Scalar> Interpreter<S> {
             groups,
             neutral,
             derivatives: None,
-            dual: None,
         }
     }
 

@@ -194,6 +194,30 @@ fn joint_forces_cost_one_addition_each_at_most() {
     }
 }
 
+/// Counts for the derivatives of mechanisms with constraints. The comments give those of dual numbers through the rates, once
+/// for each direction.
+#[test]
+fn derivatives_of_loops_stay_below_their_limits() {
+    for (name, limit) in [
+        ("slider_crank", 470),     // 512
+        ("fourbar", 540),          // 933
+        ("fourbar_3d", 1650),      // 2430
+        ("strandbeest_leg", 3500), // 7107
+        ("spring_leg", 5500),      // 14040
+        ("delta", 9000),           // 26544
+        ("rolling_disc", 2130),    // 4564
+        ("bicycle", 12100),        // 22907
+        ("stewart", 60000),        // 139472
+    ] {
+        let model = file(&format!("mechanisms/{name}.toml"), Base::Fixed, None);
+        let plan = search::plan(&model, PlanOptions::default());
+        let program = trace(&plan, Output::Derivatives, &Options::default()).expect("derivatives").program;
+        let count = program.counts().total();
+        println!("{name}: {count}");
+        assert!(count <= limit, "{name}: {count} operations, at most {limit}");
+    }
+}
+
 /// Counts for rates and all four blocks of derivatives. The comments give the operations of CasADi's code for
 /// Pinocchio's `computeABADerivatives` (`benches/rivals/derivatives`), where it was generated.
 #[test]

@@ -21,9 +21,6 @@ impl<'g> Run<'_, 'g> {
         let constrained = !self.plan.constraints.is_empty();
         let directional = Directional { graph: trace, plan: self.plan, given, tolerance: tree.tolerance };
         match (output, results) {
-            (Output::Derivatives, [v, pd, dv_dq, dv_dp, dpd_dq, dpd_dp]) if constrained => {
-                [*v, *pd, *dv_dq, *dv_dp, *dpd_dq, *dpd_dp] = directional.derivatives();
-            }
             (Output::Derivatives, [v, pd, dv_dq, dv_dp, dpd_dq, dpd_dp]) => {
                 let mut d = Derivatives::new(tree);
                 sweeps.derivatives(q, second, u, w, &mut d);

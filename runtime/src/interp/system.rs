@@ -5,7 +5,6 @@ use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::directions::DualRun;
 use super::{inputs, Interpreter};
 use crate::sweep::{Derivatives, Inputs, Sweeps};
 use crate::system::{Accelerated, Conjugate, Constrained, Differentiable, Energetic};
@@ -116,7 +115,7 @@ impl<S: Real> Constrained for Interpreter<S> {
         let changed = self.tree.reorder_rows(&at);
         if self.physical.reorder_rows(&at) || changed {
             self.work = Workspace::new(&self.tree);
-            (self.derivatives, self.dual) = (None, None);
+            self.derivatives = None;
         }
         changed
     }
@@ -131,12 +130,6 @@ impl<S: Scalar + core::fmt::Debug> Differentiable for Interpreter<S> {
     }
 
     fn rate_derivatives(&mut self, _t: S, q: &Vec<S>, p: &Vec<S>, out: &mut StateDerivatives<Vec<S>, Vec<Vec<S>>>) {
-        if !self.tree.constraints.is_empty() {
-            let mut run = self.dual.take().unwrap_or_else(|| Box::new(DualRun::new(&self.tree)));
-            run.derivatives(&inputs!(self), q, p, out);
-            self.dual = Some(run);
-            return;
-        }
         let mut d = self.derivatives.take().unwrap_or_else(|| Box::new(Derivatives::new(&self.tree)));
         self.derivatives(q, p, &mut d);
         out.v.copy_from_slice(&d.v);

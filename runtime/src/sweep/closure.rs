@@ -175,6 +175,12 @@ impl<S: Scalar> Closure<S> {
         matches!(self, Closure::PointOnLine | Closure::PointOnPlane | Closure::RollingBall { .. })
     }
 
+    /// Whether the rows are the derivatives of their residuals at all poses, closed or not.
+    pub(super) fn exact(&self) -> bool {
+        use Closure::{Distance, PointOnCylinder, PointOnLine, PointOnPlane};
+        matches!(self, Distance { .. } | PointOnLine | PointOnPlane | PointOnCylinder { .. })
+    }
+
     /// Rows that are constants, by components.
     fn components(&self) -> &'static [usize] {
         match self {
@@ -335,5 +341,28 @@ impl<S: Scalar> Closure<S> {
         }
         let rate = |f: Force<Dual<S>>| Force { lin: f.lin.map(|x| x.du), ang: f.ang.map(|x| x.du) };
         self.map(&|x| Dual::new(x, S::zero())).directions(&at.moving(rel)).map(rate)
+    }
+
+    /// Derivatives of [`Closure::direction_rates`] at the motion `rel`, where `B` moves with `way` relative to `A` and
+    /// `rel` itself changes by `bend`.
+    pub(super) fn bent_rates(
+        &self,
+        at: &Relative<S>,
+        rel: &Motion<S>,
+        way: &Motion<S>,
+        bend: &Motion<S>,
+    ) -> [Force<S>; 6] {
+        if self.constant() {
+            return [Force::zero(); 6];
+        }
+        let both = |x: Vec3<S>, dx: Vec3<S>| core::array::from_fn(|k| Dual::new(x[k], dx[k]));
+        let rel = Motion { lin: both(rel.lin, bend.lin), ang: both(rel.ang, bend.ang) };
+        let rate = |f: Force<Dual<S>>| Force { lin: f.lin.map(|x| x.du), ang: f.ang.map(|x| x.du) };
+        self.map(&|x| Dual::new(x, S::zero())).direction_rates(&at.moving(way), &rel).map(rate)
+    }
+
+    /// Rates of the residuals, where `B` moves with `rel` relative to `A`.
+    pub(super) fn residual_rates(&self, at: &Relative<S>, rel: &Motion<S>) -> [S; 6] {
+        self.map(&|x| Dual::new(x, S::zero())).residuals(&at.moving(rel)).map(|x| x.du)
     }
 }

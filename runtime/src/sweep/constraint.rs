@@ -27,9 +27,18 @@ impl<S: Scalar> Constraint<S> {
     /// Whether it is a joint to the ground whose rows are constants in the axes of the body. The motions that such a
     /// joint leaves free form a group, so `Ω × E_c` does no work on any of them. It changes nothing but the multiplier
     /// `σ`, which is a gauge variable, and need not be computed.
-    fn gauge(&self) -> bool {
+    pub(super) fn gauge(&self) -> bool {
         let held = self.decay.is_none() && self.compliance.is_none();
         matches!(&self.bond, Bond::Cut(cut) if held && cut.a.node.is_none() && cut.closure.is_joint())
+    }
+
+    /// Whether its part of `ṗ` follows from `p = ∂L/∂v` with `L = ½ vᵀM v + σᵀΦ v`: then its part of the derivatives has
+    /// the canonical symmetry.
+    pub(super) fn canonical(&self) -> bool {
+        match &self.bond {
+            Bond::Cut(cut) => self.gauge() || self.decay.is_none() && cut.closure.exact(),
+            Bond::Coupling { .. } => self.decay.is_none(),
+        }
     }
 
     /// Whether row `k` is the derivative of a condition on positions.
@@ -274,7 +283,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// `x` where row `r` acts, zero where it does not.
-    fn if_acts(&self, r: usize, x: S) -> S {
+    pub(super) fn if_acts(&self, r: usize, x: S) -> S {
         self.tree.row_factors.as_ref().map_or(x, |factors| factors[r] * x)
     }
 

@@ -27,17 +27,32 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.trace.at(frame.node, Quantity::Jacobian);
         let (mut rot, mut pos) = ([[one, o, o], [o, one, o], [o, o, one]], [o; 3]);
         self.on_body(&w.poses, frame).for_each(|step| step.pose(&mut rot, &mut pos));
-        let mut at = frame.node;
-        while let Some(i) = at {
-            self.trace.at(Some(i), Quantity::Jacobian);
+        let path = core::iter::successors(frame.node, |&i| self.tree.nodes[i].parent);
+        self.columns_along(path, (rot, pos), w, |i, k, column| {
             let node = &self.tree.nodes[i];
             if let Source::State { v, .. } = node.source {
-                for k in 0..node.kind.nv() {
-                    add(v + k, column(&node.kind.axis(k), &rot, pos).map(|x| node.ratio * x));
-                }
+                add(v + k, column.map(|x| node.ratio * x));
+            }
+        });
+    }
+
+    /// Calls `add` with a node, the number of one of its freedoms and the motion of a frame for a unit rate of it, in the
+    /// frame's axes, for every freedom of the nodes of a path inward. The frame has the pose `(rot, pos)` in the first
+    /// of these nodes, and is fixed to it.
+    pub(super) fn columns_along(
+        &self,
+        path: impl Iterator<Item = usize>,
+        (mut rot, mut pos): (Mat3<S>, Vec3<S>),
+        w: &Workspace<S>,
+        mut add: impl FnMut(usize, usize, [S; 6]),
+    ) {
+        for i in path {
+            self.trace.at(Some(i), Quantity::Jacobian);
+            let node = &self.tree.nodes[i];
+            for k in 0..node.kind.nv() {
+                add(i, k, column(&node.kind.axis(k), &rot, pos));
             }
             self.steps(&w.poses, i).iter().rev().for_each(|step| before(step, &mut rot, &mut pos));
-            at = node.parent;
         }
     }
 
@@ -76,7 +91,7 @@ fn column<S: Scalar>(axis: &Freedom<S>, rot: &Mat3<S>, pos: Vec3<S>) -> [S; 6] {
 }
 
 /// Applies a transform before the pose `(rot, pos)`.
-fn before<S: Scalar>(step: &ElementaryTransform<S>, rot: &mut Mat3<S>, pos: &mut Vec3<S>) {
+pub(super) fn before<S: Scalar>(step: &ElementaryTransform<S>, rot: &mut Mat3<S>, pos: &mut Vec3<S>) {
     if let ElementaryTransform::Shift { axis, r } = step {
         let (_, _, n) = axis.cyclic();
         pos[n] = pos[n] + *r;

@@ -1,8 +1,9 @@
-//! The three linear problems that the sweeps solve: where each keeps its right-hand side and its solution.
+//! The linear problems that the sweeps solve: where each keeps its right-hand side and its solution.
 //!
 //! For velocities the right-hand side is `p` and nothing else. For accelerations it is the joint force, and every body
 //! starts with the wrench that it needs for a reference motion (`acceleration.rs`). For the correction of positions it
-//! is zero, and the rows of the constraints ask for the negative of their residuals.
+//! is zero, and the rows of the constraints ask for the negative of their residuals. For derivatives of mechanisms with
+//! constraints it is a column of partial derivatives (`derivatives/closed.rs`).
 
 use super::pass::{each_node, visit_force, visit_motion, visit_rows, Arguments, Context, Sweep};
 use super::{Quantity, Trace};
@@ -63,6 +64,9 @@ pub(super) struct AccelerationLevel;
 /// Residuals of the constraints to the change of the coordinates that takes them away.
 pub(super) struct PositionLevel;
 
+/// Right-hand sides of one column of the derivatives to the column; the prescribed motions do not change.
+pub(super) struct ColumnLevel;
+
 impl Level for VelocityLevel {
     #[inline(always)]
     fn problem<'b, S: Scalar>(given: &'b Arguments<'_, S>, w: &'b mut Workspace<S>) -> Problem<'b, S> {
@@ -100,6 +104,19 @@ impl Level for PositionLevel {
         let (p, drive, rows) = (w.generalized.as_slice(), w.drive.as_slice(), w.constraints.rhs.as_slice());
         let load = Load { p, drive, seeds: None, rows, what: Quantity::Constraint };
         Problem { poses: &w.poses, first: &w.first, factor: &w.factor, load, solution: &mut w.velocity }
+    }
+}
+
+impl Level for ColumnLevel {
+    fn begin<S: Scalar, T: Trace>(cx: &mut Context<'_, S, T>) {
+        cx.w.drive.fill(S::zero());
+    }
+
+    #[inline(always)]
+    fn problem<'b, S: Scalar>(given: &'b Arguments<'_, S>, w: &'b mut Workspace<S>) -> Problem<'b, S> {
+        let (p, drive, rows) = (given.second, w.drive.as_slice(), w.constraints.rhs.as_slice());
+        let load = Load { p, drive, seeds: None, rows, what: Quantity::Derivative };
+        Problem { poses: &w.poses, first: &w.first, factor: &w.factor, load, solution: &mut w.acceleration }
     }
 }
 

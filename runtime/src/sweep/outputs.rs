@@ -2,7 +2,7 @@
 //!
 //! The generator's rolled code runs the same lists over one link of a chain and over the rest of its tree.
 
-use super::level::{AccelerationLevel, PositionLevel, VelocityLevel};
+use super::level::{AccelerationLevel, ColumnLevel, PositionLevel, VelocityLevel};
 use super::pass::{Arguments, Context, Results, Sweep, SweepList};
 use super::{Accelerations, FrameState, Inputs, Sweeps, Trace};
 use crate::tree::{Tree, TreeFrame};
@@ -163,6 +163,25 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Velocities from momenta.
     pub fn velocities(&self, q: &[S], p: &[S], u: &Inputs<S>, w: &mut Workspace<S>, v: &mut [S]) {
         self.context(&Arguments::new(q, p, u), w, Results { v, ..Results::none() }).run(SweepList::VELOCITIES);
+    }
+
+    /// Velocities and multipliers `σ`, after the joints' steps; the factorisation stays for [`Sweeps::solve_column`].
+    pub(super) fn velocities_of_steps(&self, p: &[S], u: &Inputs<S>, w: &mut Workspace<S>, v: &mut [S]) {
+        let given = Arguments::new(&[], p, u);
+        self.context(&given, w, Results { v, ..Results::none() }).run_after_steps(SweepList::VELOCITIES);
+        self.collect_multipliers(&w.velocity.unknown_rate, &mut w.constraints.multipliers);
+    }
+
+    /// The same linear problem with other right-hand sides: `p` for the momenta, and what stands in the place of `b` of
+    /// the constraints.
+    pub(super) fn solve_column(&self, p: &[S], u: &Inputs<S>, w: &mut Workspace<S>, v: &mut [S], sigma: &mut [S]) {
+        let given = Arguments::new(&[], p, u);
+        self.context(&given, w, Results { v, ..Results::none() }).sweep([
+            Sweep::bias_momentum::<ColumnLevel>(),
+            Sweep::motion::<ColumnLevel>(),
+            Sweep::collect::<ColumnLevel>(),
+        ]);
+        self.collect_multipliers(&w.acceleration.unknown_rate, sigma);
     }
 
     /// Rates of the state: velocities `v`, coordinate rates `q̇`, momentum rates `ṗ`.

@@ -6,6 +6,7 @@ mod cases;
 mod choices;
 mod dense;
 mod dense_reference;
+mod derivatives;
 mod penalty;
 mod reactions;
 mod row_order;

@@ -1,6 +1,5 @@
-//! Derivatives of the rates of mechanisms with constraints: the rates themselves on numbers with derivatives, once for
-//! each direction. Exact, and as long as there are directions; operations that do not depend on the direction are
-//! shared.
+//! Derivatives of the rates of mechanisms with constraints with respect to parameters: the rates themselves on numbers
+//! with derivatives, once for each parameter. Operations that do not depend on the parameter are shared.
 
 use mbd_runtime::sweep::{Inputs, Sweeps};
 use mbd_runtime::workspace::Workspace;
@@ -70,24 +69,6 @@ impl<'g> Directional<'_, 'g> {
         let sweeps = Sweeps { tree: &tree, trace: self.graph };
         sweeps.rates(q, p, &inputs, &mut Workspace::new(&tree), &mut v, &mut qd, &mut pd);
         [v, pd]
-    }
-    /// Results of [`Output::Derivatives`](crate::output::Output).
-    pub fn derivatives(&self) -> [Vec<Expr<'g>>; 6] {
-        let (plan, given, nv) = (self.plan, self.given, self.plan.dims.nv);
-        let (q, p, params) = (fixed(&given.q), fixed(&given.second), fixed(&given.params));
-        let tree = plan.tree(&given.params);
-        let sweeps = Sweeps { tree: &tree, trace: self.graph };
-        let by_q = |k: usize| {
-            let mut direction = vec![Expr::zero(); plan.dims.nq];
-            sweeps.coordinate_rates(&given.q, &unit(nv, k), &mut direction);
-            slopes(self.along(&moving(&given.q, &direction), &p, &params))
-        };
-        let by_q: Vec<_> = (0..nv).map(by_q).collect();
-        let by_p = |k: usize| slopes(self.along(&q, &moving(&given.second, &unit(nv, k)), &params));
-        let by_p: Vec<_> = (0..nv).map(by_p).collect();
-        let [v, pd] = self.along(&q, &p, &params).map(|x| x.into_iter().map(|x| x.re).collect());
-        let ([dv_dq, dpd_dq], [dv_dp, dpd_dp]) = (rows(&by_q), rows(&by_p));
-        [v, pd, dv_dq, dv_dp, dpd_dq, dpd_dp]
     }
 
     /// Results of [`Output::ParameterDerivatives`](crate::output::Output).

@@ -132,6 +132,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 d.dpd_dp[b * nv + a] = -d.dv_dq[a * nv + b];
             }
         }
+        self.own_blocks(p, d);
+    }
+
+    /// Adds `G ∂v` and `ad(v)` to the blocks of `ṗ`.
+    pub(super) fn own_blocks(&self, p: &[S], d: &mut Derivatives<S>) {
+        let nv = self.tree.dims.nv;
         for (i, node) in self.tree.nodes.iter().enumerate() {
             let Some(v) = velocity(node) else { continue };
             self.trace.at(Some(i), Quantity::Derivative);

@@ -29,7 +29,11 @@
 //! B`. `BᵀY` is symmetric and formed by halves; `G` and `ad` are small blocks: damping on the diagonal of `G`, and
 //! where velocities are not coordinate rates the commutators of the joint's own axes, `ad(v)_ab = (v × e_a)_b`, `G_ab =
 //! (e_b × e_a) · π`. Without those, `∂ṗ/∂p = −(∂v/∂q)ᵀ`: the canonical symmetry.
+//!
+//! Mechanisms with loops and couplings take the same `B` and `C`, and solve with the matrix that the rates have factored
+//! (`closed.rs`).
 
+mod closed;
 mod dense;
 mod order;
 mod pairs;
@@ -54,6 +58,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.articulate(q, u.drive_q, &mut w.poses);
         d.begin();
         self.composite_columns(w, d);
+        if !self.tree.constraints.is_empty() {
+            return self.closed_derivatives(p, u, w, d);
+        }
         self.factor_dense(d);
         self.momentum_of_drives(u, w, d);
         self.solve_dense(p, d);

@@ -15,7 +15,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Steps from there to the node frame.
-    fn past_columns<'b>(&'b self, poses: &'b Poses<S>, i: usize) -> &'b [ElementaryTransform<S>] {
+    pub(super) fn past_columns<'b>(&'b self, poses: &'b Poses<S>, i: usize) -> &'b [ElementaryTransform<S>] {
         match single(&self.tree.nodes[i]) {
             true => poses.steps.own(i),
             false => &[],
@@ -23,7 +23,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// Wrench at the columns' frame of node `i`, at the columns' frame of its parent.
-    fn force_inward(&self, poses: &Poses<S>, i: usize, f: &Force<S>) -> Force<S> {
+    pub(super) fn force_inward(&self, poses: &Poses<S>, i: usize, f: &Force<S>) -> Force<S> {
         let f = self.to_columns(poses, i).rev().fold(*f, |f, step| step.force(&f));
         let parent = self.tree.nodes[i].parent;
         let steps = parent.map_or(&[][..], |p| self.past_columns(poses, p));

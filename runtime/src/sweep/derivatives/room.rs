@@ -3,6 +3,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+use super::closed::Closed;
 use super::order::Order;
 use crate::spatial::{Force, Motion, RigidInertia, Vec3};
 use crate::system::MomentumDerivatives;
@@ -23,7 +24,7 @@ pub struct Derivatives<S> {
     pub pd: Vec<S>,
     /// `∂v/∂q`.
     pub dv_dq: Vec<S>,
-    /// `∂v/∂p`, symmetric: the inverse of the mass matrix.
+    /// `∂v/∂p`, symmetric: the inverse of the mass matrix, of the constrained one where there are constraints.
     pub dv_dp: Vec<S>,
     /// `∂ṗ/∂q`.
     pub dpd_dq: Vec<S>,
@@ -63,6 +64,8 @@ pub struct Derivatives<S> {
     pub(super) psi: Vec<Motion<S>>,
     /// Linear part of `γ × s` of every freedom.
     pub(super) fall: Vec<Vec3<S>>,
+    /// What only mechanisms with constraints have.
+    pub(super) closed: Closed<S>,
 }
 
 impl<S: Scalar> MomentumDerivatives<Vec<S>, Vec<S>> {
@@ -113,6 +116,7 @@ impl<S: Scalar> Derivatives<S> {
             rate: vec![o; freedoms],
             psi: vec![Motion::zero(); freedoms],
             fall: vec![[o; 3]; freedoms],
+            closed: Closed::new(tree),
         }
     }
 
@@ -123,6 +127,7 @@ impl<S: Scalar> Derivatives<S> {
             list.fill(o);
         }
         self.rest.fill(Force::zero());
+        self.closed.begin();
     }
 }
 
