@@ -8,6 +8,7 @@ mod names;
 mod outline;
 pub mod shapes;
 mod solid;
+mod terrain;
 mod touch;
 mod view;
 
@@ -166,13 +167,13 @@ fn sheet(plan: &Plan, scene: &Scene, drawing: &Drawing, instants: &[Instant], pa
     let joints: Vec<[f64; 3]> = bare.filter(finite).collect();
     let flat = flat(plan, drawing, instants, &joints);
     let mut seen = joints;
-    let (mut grounds, mut terrain) = (Vec::new(), Vec::new());
+    let (mut grounds, mut on_fields) = (Vec::new(), Vec::new());
     if let (Some(touch), Some(last)) = (&scene.touch, instants.last()) {
         let solids =
             instants.iter().flat_map(|i| touch.solids(&i.touched, false)).chain(touch.solids(&last.touched, true));
         seen.extend(solids.flat_map(|line| line.points).filter(finite));
         grounds = touch.grounds(&last.touched, &seen);
-        terrain = touch.terrain(&last.touched, &seen);
+        on_fields = terrain::lines(plan, &seen);
     }
     // What moves in a plane is seen from its side, whatever the widths of its shapes.
     let view = if flat.sees_a_plane() { flat } else { View::new(drawing.view, &seen) };
@@ -187,7 +188,7 @@ fn sheet(plan: &Plan, scene: &Scene, drawing: &Drawing, instants: &[Instant], pa
         .iter()
         .copied()
         .chain(corners())
-        .chain(terrain.iter().flatten().copied())
+        .chain(on_fields.iter().flatten().copied())
         .chain(pieces.into_iter().flatten());
     let all: Vec<[f64; 2]> = all.map(|p| view.project(p)).collect();
     let mut page = Page::new(all.iter().copied(), head);
@@ -205,7 +206,7 @@ fn sheet(plan: &Plan, scene: &Scene, drawing: &Drawing, instants: &[Instant], pa
         let ends = ends.map(|(p, f)| view.project(std::array::from_fn(|k| p[k] + scale.metres * f[k])));
         page = Page::new(all.iter().copied().chain(ends), head);
     }
-    Sheet { page, view, scale, down: gravity(plan), grounds, terrain }
+    Sheet { page, view, scale, down: gravity(plan), grounds, terrain: on_fields }
 }
 
 /// The view of a mechanism whose joints move in a plane, whatever the widths of its bodies, or else one in space.
@@ -284,7 +285,7 @@ pub fn svg(plan: &Plan, record: &Record, forces: &[Vec<[f64; 3]>], drawing: &Dra
 /// Floors, walls, supports, and solids on the ground.
 fn still_parts(text: &mut String, scene: &Scene, sheet: &Sheet, last: Option<&Instant>) {
     let Sheet { page, view, down, grounds, terrain, .. } = sheet;
-    terrain.iter().for_each(|line| touch::contour(text, page, view, line));
+    terrain.iter().for_each(|line| terrain::draw(text, page, view, line));
     grounds.iter().for_each(|ground| touch::ground(text, page, view, ground));
     if let (Some(touch), Some(last)) = (&scene.touch, last) {
         touch.solids(&last.touched, true).iter().for_each(|line| Outline::new(line, page, view).draw(text, false));

@@ -205,7 +205,7 @@ fn tips(model: &Model, number: &dyn Fn(Value) -> f64, known: &mut [Known]) {
         let Some(b) = shape.mount.body else { continue };
         match shape.kind {
             ShapeKind::Point | ShapeKind::Sphere { .. } => known[b].tips.push(shape.mount.placement.xyz.map(number)),
-            ShapeKind::Plane { .. } | ShapeKind::HeightField { .. } => {}
+            ShapeKind::Plane { .. } => {}
             _ => known[b].solid = true,
         }
         known[b].solid |= matches!(shape.kind, ShapeKind::Sphere { .. }) && known[b].joints.is_empty();

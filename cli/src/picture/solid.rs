@@ -92,7 +92,7 @@ impl Directions {
         self.faces.iter().flatten().map(|k| far[*k]).collect()
     }
 
-    /// A shape in its own axes; none of points, planes and height fields.
+    /// A shape in its own axes; none of points and planes.
     pub fn shape(&self, kind: &ShapeKind) -> Mesh {
         match *kind {
             ShapeKind::Sphere { radius } => self.hull(&[[0.0; 3]], radius),
@@ -103,7 +103,8 @@ impl Directions {
             ShapeKind::Box { size } => cuboid(size),
             ShapeKind::Cylinder { radius, length } => cylinder(radius, length.max(0.02 * radius)),
             ShapeKind::Hull { ref points } => self.hull(points, 0.0),
-            ShapeKind::Point | ShapeKind::Plane { .. } | ShapeKind::HeightField { .. } => Mesh::new(),
+            // Points, planes and height fields.
+            _ => Mesh::new(),
         }
     }
 }

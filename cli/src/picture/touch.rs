@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use multibody::codegen::model::{ConstraintKind, Frame, Mount, ShapeKind, Value};
 use multibody::codegen::plan::Plan;
-use multibody::runtime::field::Field;
 use multibody::runtime::spatial::Mat3;
 use multibody::runtime::sweep::FrameState;
 use multibody::runtime::tree::Closure;
@@ -38,16 +37,6 @@ struct Solid {
     colour: Option<usize>,
 }
 
-/// A height field, and the frame that carries it.
-struct Terrain {
-    frame: usize,
-    field: &'static Field,
-}
-
-/// Lines of a height field along either axis, and points of each.
-const LINES: usize = 9;
-const POINTS: usize = 80;
-
 /// A place where two bodies can touch: geometry, frames, and directions of their z.
 struct Place {
     closure: Closure<f64>,
@@ -61,7 +50,6 @@ pub struct Touch {
     frames: usize,
     planes: Vec<Plane>,
     solids: Vec<Solid>,
-    terrains: Vec<Terrain>,
     /// One for each contact; `None` for stops.
     places: Vec<Option<Place>>,
 }
@@ -129,7 +117,7 @@ pub fn ellipsoid(middle: [f64; 3], semi_axes: [f64; 3]) -> Vec<[f64; 3]> {
     (0..=AROUND / 2).flat_map(ring).collect()
 }
 
-/// Points whose hull is a solid; none for points, planes and height fields.
+/// Points whose hull is a solid; none for points and planes.
 fn surface(kind: &ShapeKind) -> Vec<[f64; 3]> {
     match *kind {
         ShapeKind::Sphere { radius } => ellipsoid([0.0; 3], [radius; 3]),
@@ -146,7 +134,8 @@ fn surface(kind: &ShapeKind) -> Vec<[f64; 3]> {
             (0..8).map(|corner| [0, 1, 2].map(|k| side(corner, k))).collect()
         }
         ShapeKind::Hull { ref points } => points.clone(),
-        ShapeKind::Point | ShapeKind::Plane { .. } | ShapeKind::HeightField { .. } => Vec::new(),
+        // Points, planes and height fields.
+        _ => Vec::new(),
     }
 }
 
@@ -170,7 +159,7 @@ impl Touch {
             model.frames.push(Frame { name, body: mount.body, placement: mount.placement });
             names.len() - 1
         };
-        let (mut planes, mut solids, mut terrains) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut planes, mut solids) = (Vec::new(), Vec::new());
         for (k, shape) in plan.model.shapes.iter().enumerate() {
             let frame = add(&shape.mount);
             match shape.kind {
@@ -183,7 +172,6 @@ impl Touch {
                     let size = sizes.fold(0.0, f64::max);
                     planes.push(Plane { frame, normal: unit(normal), patch: shape.mount.body.map(|_| size) });
                 }
-                ShapeKind::HeightField { field, .. } => terrains.push(Terrain { frame, field }),
                 ref kind => {
                     let points = surface(kind);
                     if !points.is_empty() {
@@ -215,10 +203,8 @@ impl Touch {
         let at = |index: usize| shown.frames.iter().position(|f| f.name == names[index]).unwrap_or_default();
         planes.iter_mut().for_each(|p| p.frame = at(p.frame));
         solids.iter_mut().for_each(|s| s.frame = at(s.frame));
-        terrains.iter_mut().for_each(|t| t.frame = at(t.frame));
         places.iter_mut().flatten().for_each(|p: &mut Place| p.frames = p.frames.map(at));
-        let (frames, interpreter) = (shown.frames.len(), shown.default_interpreter());
-        Some(Touch { frames, interpreter, planes, solids, terrains, places })
+        Some(Touch { frames: shown.frames.len(), interpreter: shown.default_interpreter(), planes, solids, places })
     }
 
     /// Poses of the frames at coordinates and velocities.
@@ -271,36 +257,6 @@ impl Touch {
         planes.collect()
     }
 
-    /// Lines on height fields, as far as what is seen goes.
-    pub fn terrain(&self, poses: &[FrameState<f64>], seen: &[[f64; 3]]) -> Vec<Vec<[f64; 3]>> {
-        let mut lines = Vec::new();
-        for Terrain { frame, field } in &self.terrains {
-            let at = &poses[*frame];
-            let axis = |k: usize| [0, 1, 2].map(|i: usize| at.rotation[i][k]);
-            let bounds = [0, 1].map(|k| {
-                let along = seen.iter().map(|p| dot(plus(*p, times(-1.0, at.position)), axis(k)));
-                along.fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)))
-            });
-            let pad = 0.1 * bounds.iter().fold(1e-3, |m: f64, (a, b)| m.max(b - a));
-            let place = |k: usize, part: f64| {
-                let (low, high) = bounds[k];
-                low - pad + part * (high - low + 2.0 * pad)
-            };
-            for along in 0..2 {
-                for line in 0..LINES {
-                    let point = |n: usize| {
-                        let mut x = [line as f64 / (LINES - 1) as f64; 2];
-                        x[along] = n as f64 / POINTS as f64;
-                        let x = [0, 1].map(|k| place(k, x[k]));
-                        plus(at.position, rotated(&at.rotation, [x[0], x[1], field.at(x).height]))
-                    };
-                    lines.push((0..=POINTS).map(point).collect());
-                }
-            }
-        }
-        lines
-    }
-
     /// Forces on the second bodies, or on the first ones where the second is the ground, from their components along the
     /// rows of each contact.
     pub fn arrows(&self, poses: &[FrameState<f64>], forces: &[[f64; 3]]) -> Vec<Arrow> {
@@ -340,13 +296,6 @@ pub fn ground(text: &mut String, page: &Page, view: &View, (corners, normal): &(
     let [u, w] = view.project(*normal);
     // Down the page is positive.
     hatched(text, [x1, y1], along, length, [-u, w]);
-}
-
-/// A line on a height field.
-pub fn contour(text: &mut String, page: &Page, view: &View, points: &[[f64; 3]]) {
-    let places = points.iter().map(|p| page.place(view.project(*p)));
-    let path: Vec<String> = places.map(|[x, y]| format!("{x:.1} {y:.1}")).collect();
-    let _ = writeln!(text, "<path class=\"axis\" stroke-opacity=\".6\" d=\"M{}\"/>", path.join("L"));
 }
 
 /// A line on the page with hatches behind it.
