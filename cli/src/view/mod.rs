@@ -88,7 +88,7 @@ impl Given {
             return Err(Failure::new("the page takes neither --gravity nor --base planar", help));
         }
         if model.shapes.iter().any(|shape| matches!(shape.kind, ShapeKind::HeightField { .. })) {
-            let help = "remove the shape and its contacts; `mbd simulate --picture` draws height fields";
+            let help = "remove the shape and its contacts; `mbd simulate --picture` draws height fields on the ground";
             return Err(Failure::new("the page has no height fields", help));
         }
         let mut name = file_name(path);
