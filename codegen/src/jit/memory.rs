@@ -5,6 +5,8 @@
 //!   array of which the code was made, times the number of states that it computes at once. The code reads and writes at
 //!   constant places inside these arrays, in tables that the function owns, and in working memory whose length is
 //!   compared too. Tables and working memory begin at multiples of 64 bytes, as aligned loads and stores of vectors want.
+//! - Tables of height fields are read too, at places that the code bounds by their lengths. They stay where they are until the
+//!   program ends.
 //! - Input slices are shared and result slices are exclusive references, so that the code's loads and stores do not
 //!   meet those of others.
 //! - The memory of the code lives as long as the function and is never changed after it was made, so that any number of
