@@ -52,7 +52,7 @@ pub fn write_files<C: AsRef<[u8]>>(files: &[(&Path, C)]) -> Outcome {
     let result = files.iter().try_for_each(|(path, content)| {
         writable(path)?;
         // A link stays a link, and a pipe or terminal cannot be the target of a rename.
-        let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        let target = target(path);
         if written.iter().any(|(_, other, _)| *other == target) {
             let what = format!("cannot write `{}`: two outputs have this name", path.display());
             return Err(Failure::new(what, "name a file of its own for each of them"));
@@ -72,6 +72,22 @@ pub fn write_files<C: AsRef<[u8]>>(files: &[(&Path, C)]) -> Outcome {
         written.iter().for_each(|(temporary, ..)| drop(std::fs::remove_file(temporary)));
     }
     result
+}
+
+/// The file itself that a path leads to, whether it is there or not.
+fn target(path: &Path) -> PathBuf {
+    let beside = || Some(std::fs::canonicalize(folder(path)).ok()?.join(path.file_name()?));
+    std::fs::canonicalize(path).ok().or_else(beside).unwrap_or_else(|| path.to_path_buf())
+}
+
+/// The folder of a file.
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Whether two paths lead to one file, which need not be there.
+pub fn same_file(a: &Path, b: &Path) -> bool {
+    target(a) == target(b)
 }
 
 /// The files that this process has read as its input.
@@ -95,8 +111,7 @@ pub fn writable(path: &Path) -> Outcome {
     if path.is_dir() {
         return Err(Failure::new(format!("cannot write `{}`: it is a directory", path.display()), "name a file in it"));
     }
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    std::fs::metadata(parent).map(drop).map_err(|e| failure(path, &e))
+    std::fs::metadata(folder(path)).map(drop).map_err(|e| failure(path, &e))
 }
 
 fn failure(path: &Path, e: &std::io::Error) -> Failure {

@@ -19,7 +19,7 @@ use multibody::runtime::{Interpreter, System};
 use super::args::{ContactRegime, MotionArgs, SimulateArgs, Trust};
 use super::control::{Controller, Table};
 use super::motion::{simulate, Drift, Record, Settings, Spent};
-use super::output::{note, writable, write_files};
+use super::output::{note, same_file, writable, write_files};
 use super::plot::{self, Panel};
 use super::probe::Probe;
 use super::start::{default_start, default_velocity};
@@ -93,7 +93,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     let columns = columns::chosen(&plan, &args.columns, settings.control.is_some())?;
     let csv = args.csv.clone().unwrap_or_else(|| PathBuf::from(format!("{}.csv", model.name)));
     let svg = args.svg.clone().unwrap_or_else(|| PathBuf::from(format!("{}.svg", model.name)));
-    if csv == svg {
+    if same_file(&csv, &svg) {
         return Err(Failure::new(
             format!("table and plot are both to be written to `{}`", csv.display()),
             "give --csv and --svg two names",
@@ -104,7 +104,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     writable(&svg)?;
     let drawing = picture::drawing(&plan, args)?;
     if let Some(file) = &args.picture {
-        if *file == csv || *file == svg {
+        if same_file(file, &csv) || same_file(file, &svg) {
             let what = format!("--picture: `{}` is to hold the table or plot already", file.display());
             return Err(Failure::new(what, "give it a name of its own"));
         }

@@ -213,6 +213,24 @@ fn simulates() {
     assert_eq!((rows.len(), rows[1000][0]), (1001, 10.0));
 }
 
+/// Two paths of one file that is not there yet are found before anything is computed, and nothing is written.
+#[test]
+fn results_of_a_simulation_are_files_of_their_own() {
+    let folder = folder("simulate_one_file");
+    let model = format!("{ROOT}/models/double_pendulum.toml");
+    let absolute = folder.join("double_pendulum.svg");
+    let absolute = absolute.to_str().expect("text");
+    for file in ["double_pendulum.svg", "./double_pendulum.svg", absolute, "./double_pendulum.csv"] {
+        let output = run_in(&folder, &["simulate", &model, "--time", "0.1", "--picture", file]);
+        bad(output, &["is to hold the table or plot already", "give it a name of its own"]);
+    }
+    bad(
+        run_in(&folder, &["simulate", &model, "--time", "0.1", "--csv", "a.csv", "--svg", "./a.csv"]),
+        &["table and plot are both to be written to", "give --csv and --svg two names"],
+    );
+    assert!(files(&folder).is_empty());
+}
+
 /// Machine code made at run time and the interpreter write the same table, loops, dampers, dense rows and all.
 #[test]
 fn simulates_the_same_interpreted() {
