@@ -12,7 +12,5 @@ venv=target/python-venv
 cargo fmt --check --manifest-path python/Cargo.toml
 # The package's build finds maturin on the path.
 export PATH=$PWD/$venv/bin:$PATH
-# Clippy reads what is compiled, and denies warnings.
-RUSTC_WORKSPACE_WRAPPER=clippy-driver CLIPPY_ARGS=-D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__ \
-    pip install --quiet --no-build-isolation --no-deps --force-reinstall ./python
+bash .ci/with-clippy.sh pip install --quiet --no-build-isolation --no-deps --force-reinstall ./python
 pytest -q python "$@"

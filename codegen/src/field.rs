@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
-use mbd_runtime::field::{Ball, Field, Ground};
+use mbd_runtime::field::{Ball, Field, Foot};
 
 /// Most heights of a field.
 pub(crate) const MOST: usize = 65_536;
@@ -33,7 +33,18 @@ pub(crate) fn field(spacing: [f64; 2], heights: &[Vec<f64>]) -> &'static Field {
     let cell = |n: usize| kept((0..n).map(|k| k as f64).collect());
     let inside = |n: usize| kept((0..n).map(|k| if k == 0 || k + 1 == n { 0.0 } else { 1.0 }).collect());
     let all = Field { spacing, points, net: kept(net), cells: cells.map(cell), inside: cells.map(inside), slope };
-    Box::leak(Box::new(all))
+    // As the tables, equal fields exist once.
+    static ALL: Mutex<Vec<&'static Field>> = Mutex::new(Vec::new());
+    let mut known = ALL.lock().unwrap_or_else(PoisonError::into_inner);
+    let same = |field: &&&Field| {
+        (field.net.as_ptr(), field.points, field.spacing) == (all.net.as_ptr(), all.points, all.spacing)
+    };
+    if let Some(field) = known.iter().find(same) {
+        return field;
+    }
+    let field = Box::leak(Box::new(all));
+    known.push(field);
+    field
 }
 
 /// Control numbers of the spline through numbers that are one apart, with three more like the first one in front of it, and
@@ -128,10 +139,9 @@ fn tried(field: &Field, radius: f64) -> Fit {
     };
     for (beside_x, x) in places(0) {
         for (beside_y, y) in places(1) {
-            let ground = field.at([x, y]);
-            let [p, q] = ground.slope;
-            let cosine = 1.0 / (1.0 + p * p + q * q).sqrt();
-            let middle = [x - radius * cosine * p, y - radius * cosine * q];
+            // Beside the origin: where the middle of a ball is that touches here.
+            let foot = field.foot([x, y], [0.0; 2], Some(radius));
+            let middle = foot.off;
             let near = |steps: usize| {
                 let found = field.under(middle, Some(Ball { radius, steps })).place;
                 length(found[0] - x, found[1] - y) <= NEAR * radius
@@ -143,7 +153,7 @@ fn tried(field: &Field, radius: f64) -> Fit {
             match (fit.steps..STEPS).find(|steps| near(*steps)) {
                 Some(steps) => fit.steps = steps + 1,
                 None => {
-                    let here = Narrow { at: [x, y], radius: hollow(&ground, cosine) };
+                    let here = Narrow { at: [x, y], radius: hollow(&foot) };
                     let narrowest = &mut fit.narrow[usize::from(beside_x || beside_y)];
                     if narrowest.is_none_or(|other| here.radius < other.radius) {
                         *narrowest = Some(here);
@@ -156,15 +166,12 @@ fn tried(field: &Field, radius: f64) -> Fit {
 }
 
 /// The smallest radius of a hollow, m.
-fn hollow(ground: &Ground<f64>, cosine: f64) -> f64 {
-    let ([p, q], [a, b, c]) = (ground.slope, ground.bend);
-    let square = cosine * cosine;
-    let (along, beside) = (square * (a * p + b * q), square * (b * p + c * q));
-    let m = [[a - p * along, b - p * beside], [b - q * along, c - q * beside]];
+fn hollow(foot: &Foot<f64>) -> f64 {
+    let m = foot.curvature();
     let (half, difference) = (0.5 * (m[0][0] + m[1][1]), 0.5 * (m[0][0] - m[1][1]));
     let most = half + (difference * difference + m[0][1] * m[1][0]).max(0.0).sqrt();
     if most > 0.0 {
-        1.0 / (cosine * most)
+        1.0 / (foot.cosine * most)
     } else {
         f64::INFINITY
     }
@@ -172,6 +179,8 @@ fn hollow(ground: &Ground<f64>, cosine: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use mbd_runtime::field::Ground;
+
     use super::*;
 
     fn rows(points: [usize; 2], spacing: [f64; 2], h: impl Fn(f64, f64) -> f64) -> Vec<Vec<f64>> {

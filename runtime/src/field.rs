@@ -126,7 +126,8 @@ impl Field {
         self.foot(place, middle, Some(radius))
     }
 
-    fn foot<S: Scalar>(&self, place: [S; 2], middle: [S; 2], radius: Option<S>) -> Foot<S> {
+    /// Where a ball of a radius, or a point, lies that touches at a `place`, m, beside where its `middle` was to be.
+    pub fn foot<S: Scalar>(&self, place: [S; 2], middle: [S; 2], radius: Option<S>) -> Foot<S> {
         let ground = self.at(place);
         let [p, q] = ground.slope;
         let cosine = S::one() / (S::one() + (p * p + q * q)).sqrt();
@@ -142,17 +143,20 @@ impl Field {
 }
 
 impl<S: Scalar> Foot<S> {
+    /// How the ground bends: `(1 − w² ∇h ∇hᵀ) H` with the cosine `w` and the second derivatives `H`, 1/m. Its eigenvalues are
+    /// the principal curvatures over `w`.
+    pub fn curvature(&self) -> [[S; 2]; 2] {
+        let Foot { ground: Ground { slope: [p, q], bend: [a, b, c], .. }, cosine, .. } = *self;
+        let along = [a * p + b * q, b * p + c * q].map(|x| cosine * cosine * x);
+        [[a - p * along[0], b - p * along[1]], [b - q * along[0], c - q * along[1]]]
+    }
+
     /// The place after a step of Newton's method, m.
     fn next(&self, radius: S) -> [S; 2] {
-        let Foot { place, ground: Ground { slope: [p, q], bend: [a, b, c], .. }, cosine, off } = *self;
+        let Foot { place, cosine, off, .. } = *self;
         // The derivative of `off` by `place`: 1 − r w (1 − w² ∇h ∇hᵀ) H.
-        let along = [a * p + b * q, b * p + c * q].map(|x| cosine * cosine * x);
-        let factor = radius * cosine;
-        let one = S::one();
-        let m = [
-            [one - factor * (a - p * along[0]), -(factor * (b - p * along[1]))],
-            [-(factor * (b - q * along[0])), one - factor * (c - q * along[1])],
-        ];
+        let (one, factor, [[a, b], [c, d]]) = (S::one(), radius * cosine, self.curvature());
+        let m = [[one - factor * a, -(factor * b)], [-(factor * c), one - factor * d]];
         let inverse = (m[0][0] * m[1][1] - m[0][1] * m[1][0]).reciprocal_above(S::constant(1e-6));
         let step = [m[1][1] * off[0] - m[0][1] * off[1], m[0][0] * off[1] - m[1][0] * off[0]];
         core::array::from_fn(|k| place[k] - inverse * step[k])

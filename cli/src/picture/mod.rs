@@ -173,7 +173,7 @@ fn sheet(plan: &Plan, scene: &Scene, drawing: &Drawing, instants: &[Instant], pa
             instants.iter().flat_map(|i| touch.solids(&i.touched, false)).chain(touch.solids(&last.touched, true));
         seen.extend(solids.flat_map(|line| line.points).filter(finite));
         grounds = touch.grounds(&last.touched, &seen);
-        on_fields = terrain::lines(plan, &seen);
+        on_fields = touch.terrains(&last.touched, &seen);
     }
     // What moves in a plane is seen from its side, whatever the widths of its shapes.
     let view = if flat.sees_a_plane() { flat } else { View::new(drawing.view, &seen) };

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use multibody::codegen::model::{ConstraintKind, Frame, Mount, ShapeKind, Value};
 use multibody::codegen::plan::Plan;
+use multibody::runtime::field::Field;
 use multibody::runtime::spatial::Mat3;
 use multibody::runtime::sweep::FrameState;
 use multibody::runtime::tree::Closure;
@@ -11,6 +12,7 @@ use multibody::runtime::Interpreter;
 
 use super::limbs;
 use super::shapes::Line;
+use super::terrain::lines;
 use super::view::{Page, View};
 
 /// Part of the page's size below which corners of outlines are left out: round ones stay round.
@@ -37,6 +39,12 @@ struct Solid {
     colour: Option<usize>,
 }
 
+/// A height field on the ground, and the frame in whose axes it is.
+struct Terrain {
+    frame: usize,
+    field: &'static Field,
+}
+
 /// A place where two bodies can touch: geometry, frames, and directions of their z.
 struct Place {
     closure: Closure<f64>,
@@ -50,6 +58,7 @@ pub struct Touch {
     frames: usize,
     planes: Vec<Plane>,
     solids: Vec<Solid>,
+    terrains: Vec<Terrain>,
     /// One for each contact; `None` for stops.
     places: Vec<Option<Place>>,
 }
@@ -57,11 +66,11 @@ pub struct Touch {
 /// A force on a body, in ground axes: where it acts, m, and its components, N.
 pub type Arrow = ([f64; 3], [f64; 3]);
 
-fn rotated(m: &Mat3<f64>, x: [f64; 3]) -> [f64; 3] {
+pub fn rotated(m: &Mat3<f64>, x: [f64; 3]) -> [f64; 3] {
     m.map(|row| row[0] * x[0] + row[1] * x[1] + row[2] * x[2])
 }
 
-fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+pub fn plus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     std::array::from_fn(|k| a[k] + b[k])
 }
 
@@ -159,7 +168,7 @@ impl Touch {
             model.frames.push(Frame { name, body: mount.body, placement: mount.placement });
             names.len() - 1
         };
-        let (mut planes, mut solids) = (Vec::new(), Vec::new());
+        let (mut planes, mut solids, mut terrains) = (Vec::new(), Vec::new(), Vec::new());
         for (k, shape) in plan.model.shapes.iter().enumerate() {
             let frame = add(&shape.mount);
             match shape.kind {
@@ -171,6 +180,9 @@ impl Touch {
                         .map(|other| surface(&plan.model.shapes[other].kind).into_iter().map(norm).fold(0.0, f64::max));
                     let size = sizes.fold(0.0, f64::max);
                     planes.push(Plane { frame, normal: unit(normal), patch: shape.mount.body.map(|_| size) });
+                }
+                ShapeKind::HeightField { field, .. } => {
+                    terrains.extend(shape.mount.body.is_none().then_some(Terrain { frame, field }));
                 }
                 ref kind => {
                     let points = surface(kind);
@@ -203,8 +215,10 @@ impl Touch {
         let at = |index: usize| shown.frames.iter().position(|f| f.name == names[index]).unwrap_or_default();
         planes.iter_mut().for_each(|p| p.frame = at(p.frame));
         solids.iter_mut().for_each(|s| s.frame = at(s.frame));
+        terrains.iter_mut().for_each(|t| t.frame = at(t.frame));
         places.iter_mut().flatten().for_each(|p: &mut Place| p.frames = p.frames.map(at));
-        Some(Touch { frames: shown.frames.len(), interpreter: shown.default_interpreter(), planes, solids, places })
+        let (frames, interpreter) = (shown.frames.len(), shown.default_interpreter());
+        Some(Touch { frames, interpreter, planes, solids, terrains, places })
     }
 
     /// Poses of the frames at coordinates and velocities.
@@ -255,6 +269,11 @@ impl Touch {
             ([corner(false, false), corner(true, false), corner(true, true), corner(false, true)], n)
         });
         planes.collect()
+    }
+
+    /// Lines on the height fields on the ground, as far as what is seen goes.
+    pub fn terrains(&self, poses: &[FrameState<f64>], seen: &[[f64; 3]]) -> Vec<Vec<[f64; 3]>> {
+        self.terrains.iter().flat_map(|terrain| lines(terrain.field, &poses[terrain.frame], seen)).collect()
     }
 
     /// Forces on the second bodies, or on the first ones where the second is the ground, from their components along the

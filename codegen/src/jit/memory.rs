@@ -196,7 +196,7 @@ impl<S: Number> MachineCode<S> {
             Some(width) => {
                 let sines = S::SINES[usize::from(fast)] as usize as u64;
                 let written = vectors::compile(program, &results, fused, width, sines)
-                    .ok_or_else(|| CompileError::machine("the code is too long for vectors"))?;
+                    .ok_or_else(|| CompileError::machine("the code is too long for vectors, or looks numbers up"))?;
                 module.define_function_bytes(id, 64, &written.bytes, &[]).map_err(CompileError::machine)?;
                 Body { scratch: written.scratch, size: written.bytes.len(), numbers: written.numbers }
             }

@@ -6,12 +6,12 @@ use mbd_codegen::plan::Plan;
 use mbd_runtime::contact::{Hybrid, Mode, Touching, Way, WithContacts};
 use mbd_runtime::field::Field;
 use mbd_runtime::integrate::{Dop853, Step, Tolerances};
-use mbd_runtime::spatial::{add3, cross, dot3, scale3};
+use mbd_runtime::spatial::{add3, scale3};
 use mbd_runtime::Conjugate;
 use mbd_testing::random::Rng;
 
 use super::scene::{model, Scene};
-use super::solid::{back, floating, later, least, less, norm, placed, random_pose, rows, turned};
+use super::solid::{back, floating, gap_rate, later, least, less, norm, placed, random_pose, rows, slip, turned};
 
 /// A height field shape on a body, or on the ground, with heights at points that are `spacing` apart.
 pub(super) fn field(body: Option<&str>, points: [usize; 2], spacing: [f64; 2], h: impl Fn(f64, f64) -> f64) -> String {
@@ -92,32 +92,15 @@ fn gaps_are_distances_where_bodies_touch_and_rows_their_rates() {
                 }
             };
             let n = turned(&q, n);
-            let at = less([q[7], q[8], q[9]], scale3(radius, n));
-            let speed = |body: usize| {
-                let (k, p) = (6 * body, &q[7 * body..]);
-                let [lin, ang] = [k, k + 3].map(|k| turned(p, [v[k], v[k + 1], v[k + 2]]));
-                add3(lin, cross(ang, less(at, [p[0], p[1], p[2]])))
-            };
-            let slip = less(speed(1), speed(0));
-            let normal = dot3(slip, n);
-            let across = norm(less(slip, scale3(normal, n)));
+            let [normal, across] = slip(&q, &v, less([q[7], q[8], q[9]], scale3(radius, n)), n);
             let got = (found.rates[1] * found.rates[1] + found.rates[2] * found.rates[2]).sqrt();
             // The search finds places to the root of rounding errors over the curvature of the distance, differences know
             // the slope to 1e-10; speeds are a few metres a second.
             worst[1] = worst[1].max((found.rates[0] - normal).abs()).max((got - across).abs());
             assert!((found.rates[0] - normal).abs() < 1e-6, "{radius}: {} {normal}", found.rates[0]);
             assert!((got - across).abs() < 1e-6, "{radius}: {got} {across}");
-            let h = 1e-5;
-            let [ahead, behind] = [h, -h].map(|h| {
-                let mut q = later(&mut scene, &q, &v, h);
-                for k in [3, 10] {
-                    let n = q[k..k + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
-                    q[k..k + 4].iter_mut().for_each(|x| *x /= n);
-                }
-                rows(&mut scene, &q, &v).gap
-            });
             // Errors of the quotient: h² times third derivatives of the surface, and rounding over h.
-            let rate = (ahead - behind) * 0.5 / h;
+            let rate = gap_rate(&mut scene, &q, &v);
             worst[2] = worst[2].max((rate - found.rates[0]).abs());
             assert!((rate - found.rates[0]).abs() < 1e-8, "{radius}: {rate} {}", found.rates[0]);
             let other = rows(&mut swapped, &q, &v);
@@ -168,10 +151,6 @@ fn bounds_of_how_fast_gaps_close_hold() {
                     break;
                 }
                 q = later(&mut scene, &q, &v, h);
-                for k in [3, 10] {
-                    let n = q[k..k + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
-                    q[k..k + 4].iter_mut().for_each(|x| *x /= n);
-                }
                 let now = rows(&mut scene, &q, &v).gap;
                 tight = tight.max(1.0 - now / gap);
                 assert!(now > 0.0, "{shape}: {gap} became {now} with {left} left");

@@ -185,11 +185,38 @@ pub(super) fn rows(scene: &mut Scene, q: &[f64], v: &[f64]) -> Rows {
     Rows { gap: gaps[0], rates: [rates[0], rates[1], rates[2]], row }
 }
 
-/// Coordinates a time `h` later at constant rates.
+/// Coordinates of two free bodies a time `h` later at constant rates, with quaternions of unit length.
 pub(super) fn later(scene: &mut Scene, q: &[f64], v: &[f64], h: f64) -> Vec<f64> {
     let (q, mut qd) = (q.to_vec(), q.to_vec());
     scene.system.system_mut().coordinate_rates(&q, &v.to_vec(), &mut qd);
-    q.iter().zip(&qd).map(|(q, qd)| q + h * qd).collect()
+    let mut q: Vec<f64> = q.iter().zip(&qd).map(|(q, qd)| q + h * qd).collect();
+    for k in [3, 10] {
+        let n = q[k..k + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
+        q[k..k + 4].iter_mut().for_each(|x| *x /= n);
+    }
+    q
+}
+
+/// Rate of the gap by a difference quotient.
+pub(super) fn gap_rate(scene: &mut Scene, q: &[f64], v: &[f64]) -> f64 {
+    let h = 1e-5;
+    let [ahead, behind] = [h, -h].map(|h| {
+        let q = later(scene, q, v, h);
+        rows(scene, &q, v).gap
+    });
+    (ahead - behind) * 0.5 / h
+}
+
+/// Velocity of the second of two free bodies against the first at a place of the ground: along a direction, and its size across it.
+pub(super) fn slip(q: &[f64], v: &[f64], at: Vec3<f64>, n: Vec3<f64>) -> [f64; 2] {
+    let speed = |body: usize| {
+        let (k, p) = (6 * body, &q[7 * body..]);
+        let [lin, ang] = [k, k + 3].map(|k| turned(p, [v[k], v[k + 1], v[k + 2]]));
+        add3(lin, cross(ang, less(at, [p[0], p[1], p[2]])))
+    };
+    let slip = less(speed(1), speed(0));
+    let normal = dot3(slip, n);
+    [normal, norm(less(slip, scale3(normal, n)))]
 }
 
 /// Middles that are nearer than this are left out: the directions between them have few digits.
@@ -231,14 +258,7 @@ fn gaps_are_the_least_distances_and_rows_their_rates() {
             // Positions move by `h` along the rates, quaternions leave unit length by h²; both errors of the difference
             // quotient are about 1e-9. Places from the search are right to 1e-7. those of the places are larger, at most 1e-7.
             let h = 1e-5;
-            let ahead = [h, -h].map(|h| {
-                let mut q = later(&mut scene, &q, &v, h);
-                for k in [3, 10] {
-                    let n = q[k..k + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
-                    q[k..k + 4].iter_mut().for_each(|x| *x /= n);
-                }
-                q
-            });
+            let ahead = [h, -h].map(|h| later(&mut scene, &q, &v, h));
             let [a, b] = [0, 7].map(|k| {
                 let [x, y] = [0, 1].map(|s| placed(&ahead[s][k..], fixed[k / 7]));
                 scale3(0.5 / h, less(x, y))
@@ -291,29 +311,13 @@ fn an_ellipsoid_is_as_high_as_its_lowest_point() {
         assert!((found.gap - lowest).abs() < 1e-13, "{} {lowest}", found.gap);
         // The velocity of the lowest point of the egg against that of the plane's body at the same place. The search finds
         // places to the root of rounding errors.
-        let at = placed(&q[7..], on_egg(&x));
-        let speed = |body: usize| {
-            let (k, p) = (6 * body, &q[7 * body..]);
-            let [lin, ang] = [k, k + 3].map(|k| turned(p, [v[k], v[k + 1], v[k + 2]]));
-            add3(lin, cross(ang, less(at, [p[0], p[1], p[2]])))
-        };
-        let slip = less(speed(1), speed(0));
-        let normal = dot3(slip, n);
-        let across = norm(less(slip, scale3(normal, n)));
+        let [normal, across] = slip(&q, &v, placed(&q[7..], on_egg(&x)), n);
         let got = (found.rates[1] * found.rates[1] + found.rates[2] * found.rates[2]).sqrt();
         assert!((found.rates[0] - normal).abs() < 1e-6, "{} {normal}", found.rates[0]);
         assert!((got - across).abs() < 1e-6, "{got} {across}");
-        let h = 1e-5;
-        let [a, b] = [h, -h].map(|h| {
-            let mut q = later(&mut scene, &q, &v, h);
-            for k in [3, 10] {
-                let n = q[k..k + 4].iter().map(|x| x * x).sum::<f64>().sqrt();
-                q[k..k + 4].iter_mut().for_each(|x| *x /= n);
-            }
-            rows(&mut scene, &q, &v).gap
-        });
         // Errors of the quotient: h² and rounding over h, times curvatures of a few.
-        assert!(((a - b) * 0.5 / h - found.rates[0]).abs() < 1e-8, "{} {}", (a - b) * 0.5 / h, found.rates[0]);
+        let rate = gap_rate(&mut scene, &q, &v);
+        assert!((rate - found.rates[0]).abs() < 1e-8, "{rate} {}", found.rates[0]);
         let other = rows(&mut swapped, &q, &v);
         assert!((other.gap - found.gap).abs() < 1e-15 && other.row == found.row);
     }

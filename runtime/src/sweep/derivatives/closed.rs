@@ -42,69 +42,35 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::mem::take;
 
+use super::loop_path::LoopFreedom;
 use super::pairs::add;
-use super::{single, velocity, Derivatives};
-use crate::spatial::{dot3, scale3, Force, Motion};
-use crate::sweep::constraint::difference;
-use crate::sweep::jacobian::before;
+use super::{velocity, Derivatives};
+use crate::spatial::{Force, Motion};
 use crate::sweep::{Inputs, Quantity, Sweeps, Trace};
-use crate::tree::{Bond, Constraint, Cut, Tree};
-use crate::workspace::Workspace;
+use crate::tree::{Bond, Closure, Constraint, Cut, Tree};
+use crate::workspace::{Relative, Workspace};
 use crate::Scalar;
 
-/// A freedom on the path of a loop, in axes of the second frame.
-#[derive(Clone, Copy, Debug)]
-struct LoopFreedom<S> {
-    /// Its node.
-    node: usize,
-    /// Whether it is on the path to the second frame.
-    second: bool,
-    /// Its velocity, if it belongs to the state.
-    velocity: Option<usize>,
-    /// Its rate.
-    rate: S,
-    /// Motion of the second frame relative to the first at a unit rate.
-    axis: Motion<S>,
-    /// Motion of the body before the joint, relative to the first frame.
-    inner: Motion<S>,
-    /// The same of the body behind the joint.
-    outer: Motion<S>,
-    /// `(Ω_outer − Ω_inner) × s`: zero, and known to be, where the joint has no other freedom.
-    twist: Motion<S>,
+/// A loop in the axes of its second frame `B`.
+struct Loop<'a, S> {
+    constraint: &'a Constraint<S>,
+    closure: &'a Closure<S>,
+    at: Relative<S>,
+    /// Multipliers of its rows.
+    sigma: &'a [S],
+    /// `Ω`: motion of the second frame relative to the first.
+    motion: Motion<S>,
+    /// `E` of every row, and `E'(Ω)`.
+    directions: [Force<S>; 6],
+    rates: [Force<S>; 6],
+    /// `f` and `f°`.
+    f: Force<S>,
+    turning: Force<S>,
 }
 
-impl<S> LoopFreedom<S> {
-    /// Whether a change of the coordinate of `other` turns this axis.
-    fn turned_by(&self, other: &Self) -> bool {
-        match self.second {
-            true => other.second && other.node > self.node,
-            false => other.second || other.node <= self.node,
-        }
-    }
-}
-
-/// Of the motions before and behind a joint with one freedom, either serves in products with its axis: that one is taken
-/// which is known to be zero at an end of the loop.
-impl<S: Scalar> LoopFreedom<S> {
-    /// `Ω_a × s_a`.
-    fn turn(&self) -> Motion<S> {
-        match self.second {
-            true => self.inner.cross_motion(&self.axis),
-            false => difference(&self.outer.cross_motion(&self.axis), &self.twist),
-        }
-    }
-
-    /// `(Ω − Ω_a) × s_a`, with the motion `Ω` of the second frame.
-    fn swing(&self, motion: &Motion<S>) -> Motion<S> {
-        difference(motion, &self.outer).cross_motion(&self.axis).plus(&self.twist)
-    }
-
-    /// `χ`, with the motion of the second frame, `f`, `f°` and `φ`.
-    fn chi(&self, motion: &Motion<S>, f: &Force<S>, turning: &Force<S>, phi: &Force<S>) -> Force<S> {
-        let ahead = difference(motion, &self.outer).cross_force(f).plus(turning);
-        let all = self.outer.cross_force(phi).plus(&self.axis.cross_force(&ahead));
-        all.minus(&self.twist.cross_force(f))
-    }
+/// `Σ E σ`.
+fn wrench<S: Scalar>(directions: &[Force<S>; 6], sigma: &[S]) -> Force<S> {
+    directions.iter().zip(sigma).fold(Force::zero(), |sum, (e, sigma)| sum.plus(&e.times(*sigma)))
 }
 
 /// Partial derivatives and columns of mechanisms with constraints; empty for all others.
@@ -129,7 +95,7 @@ pub(super) struct Closed<S> {
     /// One multiplier for each row.
     sigma: Vec<S>,
     /// Freedoms of one loop.
-    path: Vec<LoopFreedom<S>>,
+    pub path: Vec<LoopFreedom<S>>,
 }
 
 impl<S: Scalar> Closed<S> {
@@ -231,47 +197,6 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
-    /// The freedoms of a loop, and the motion of its second frame relative to the first.
-    fn loop_freedoms(&self, index: usize, cut: &Cut<S>, w: &Workspace<S>, d: &mut Derivatives<S>) -> Motion<S> {
-        let (o, one) = (S::zero(), S::one());
-        let (path, rates) = (&mut d.closed.path, &d.rate);
-        path.clear();
-        let mut push = |second: bool, i: usize, k: usize, [x, y, z, a, b, c]: [S; 6]| {
-            let node = &self.tree.nodes[i];
-            let sign = if second { one } else { -one };
-            let axis = scaled(&Motion { lin: [x, y, z], ang: [a, b, c] }, sign);
-            let (velocity, rate) = (velocity(node).map(|v| v + k), rates[w.first[i] + k]);
-            let (inner, outer, twist) = (Motion::zero(), Motion::zero(), Motion::zero());
-            path.push(LoopFreedom { node: i, second, velocity, rate, axis, inner, outer, twist });
-        };
-        let at = &w.constraints.relative[index];
-        let mut rot = core::array::from_fn(|i| at.axis(i));
-        let mut pos = core::array::from_fn(|i| dot3(at.axis(i), at.d));
-        self.on_body(&w.poses, &cut.a).rev().for_each(|step| before(&step, &mut rot, &mut pos));
-        self.columns_along(cut.path_a.iter().rev().copied(), (rot, pos), w, |i, k, axis| push(false, i, k, axis));
-        let (mut rot, mut pos) = ([[one, o, o], [o, one, o], [o, o, one]], [o; 3]);
-        self.on_body(&w.poses, &cut.b).for_each(|step| step.pose(&mut rot, &mut pos));
-        self.columns_along(cut.path_b.iter().rev().copied(), (rot, pos), w, |i, k, axis| push(true, i, k, axis));
-        // Around the loop: inward from the first frame, then outward to the second.
-        let mut motion = Motion::zero();
-        let sides = [(false, &cut.path_a), (true, &cut.path_b)];
-        let order = sides[0].1.iter().rev().map(|i| (false, *i)).chain(sides[1].1.iter().map(|i| (true, *i)));
-        for (second, i) in order {
-            let here = |x: &&mut LoopFreedom<S>| x.second == second && x.node == i;
-            let rates = path.iter_mut().filter(here).map(|x| scaled(&x.axis, x.rate));
-            let own = rates.fold(Motion::zero(), |sum, rate| sum.plus(&rate));
-            let start = motion;
-            motion = motion.plus(&own);
-            let (inner, outer, own) = if second { (start, motion, own) } else { (motion, start, scaled(&own, -one)) };
-            let several = !single(&self.tree.nodes[i]);
-            for x in path.iter_mut().filter(here) {
-                (x.inner, x.outer) = (inner, outer);
-                x.twist = if several { own.cross_motion(&x.axis) } else { Motion::zero() };
-            }
-        }
-        motion
-    }
-
     /// Partial derivatives of a loop whose wrench is no momentum of a body.
     fn loop_products(
         &self,
@@ -281,74 +206,84 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         w: &Workspace<S>,
         d: &mut Derivatives<S>,
     ) {
-        let (nv, rows) = (self.tree.dims.nv, self.tree.dims.rows);
         let motion = self.loop_freedoms(index, cut, w, d);
         self.trace.at(None, Quantity::Derivative);
-        let (at, closure) = (&w.constraints.relative[index], &cut.closure);
-        let directions = |r: usize| w.constraints.rows[constraint.first + r].e;
-        let wrench = |of: &dyn Fn(usize) -> Force<S>| {
-            let sigma = &w.constraints.multipliers[constraint.range()];
-            sigma.iter().enumerate().fold(Force::zero(), |sum, (r, sigma)| sum.plus(&of(r).times(*sigma)))
-        };
-        let rates = closure.direction_rates(at, &motion);
-        let (f, turning) = (wrench(&directions), wrench(&|r| rates[r]));
+        let at = w.constraints.relative[index];
+        let (rates, zero) = (cut.closure.direction_rates(&at, &motion), Force::zero());
+        let sigma = &w.constraints.multipliers[constraint.range()];
+        let directions: [Force<S>; 6] = core::array::from_fn(|r| match r < sigma.len() {
+            true => w.constraints.rows[constraint.first + r].e,
+            false => zero,
+        });
+        let [f, turning] = [&directions, &rates].map(|e| wrench(e, sigma));
+        let of = Loop { constraint, closure: &cut.closure, at, sigma, motion, directions, rates, f, turning };
         let path = take(&mut d.closed.path);
-        let canonical = constraint.canonical();
         for k in &path {
-            let Some(b) = k.velocity else { continue };
-            let ratio = self.tree.nodes[k.node].ratio;
-            let psi = k.turn();
-            let turned = closure.direction_rates(at, &k.axis);
-            let bent = closure.bent_rates(at, &motion, &k.axis, &psi);
-            let (f_k, turning_k) = (wrench(&|r| turned[r]), wrench(&|r| bent[r]));
-            let phi = k.axis.cross_force(&f);
-            let chi = k.chi(&motion, &f, &turning, &phi);
-            for a in &path {
-                let Some(v) = a.velocity else { continue };
-                let both = self.tree.nodes[a.node].ratio * ratio;
-                let turned = a.turned_by(k);
-                let mirrored = canonical && a.node != k.node;
-                if mirrored && turned {
-                    continue;
-                }
-                let (mut x, mut c) = (f_k.dot(&a.axis), turning_k.dot(&a.axis) - f_k.dot(&a.swing(&motion)));
-                if turned {
-                    x = x + phi.dot(&a.axis);
-                    c = c + chi.dot(&a.axis) + phi.dot(&a.turn());
-                }
-                let bend = if canonical { &mut d.b } else { &mut d.closed.bend };
-                add(&mut bend[v * nv + b], both * x);
-                add(&mut d.dpd_dq[v * nv + b], both * c);
-                if mirrored {
-                    add(&mut bend[b * nv + v], both * x);
-                    add(&mut d.dpd_dq[b * nv + v], both * c);
-                }
-            }
-            let residuals = constraint.decay.map(|decay| {
-                let acts = self.if_acts(constraint.first, decay);
-                closure.residual_rates(at, &k.axis).map(|x| acts * x)
-            });
-            for (r, row) in constraint.range().enumerate() {
-                let held = residuals.filter(|_| constraint.holonomic(r)).map_or(S::zero(), |x| x[r]);
-                let x = directions(r).dot(&psi) + turned[r].dot(&motion) + held;
-                add(&mut d.closed.rows[row * nv + b], ratio * x);
-            }
+            self.loop_column(&of, k, &path, d);
         }
         for a in &path {
-            let Some(v) = a.velocity else { continue };
-            let node = &self.tree.nodes[a.node];
-            let swing = a.swing(&motion);
-            add(&mut d.pd[v], node.ratio * (turning.dot(&a.axis) - f.dot(&swing)));
-            if canonical {
-                continue;
-            }
-            add(&mut d.closed.held[v], -(node.ratio * f.dot(&a.axis)));
-            for (r, row) in constraint.range().enumerate() {
-                let x = rates[r].dot(&a.axis) - directions(r).dot(&swing);
-                add(&mut d.closed.z[v * rows + row], node.ratio * x);
-            }
+            self.loop_momentum(&of, a, d);
         }
         d.closed.path = path;
+    }
+
+    /// `A`, `C⁺` and `R` of a loop for a change of the coordinate of freedom `k`.
+    fn loop_column(&self, of: &Loop<S>, k: &LoopFreedom<S>, path: &[LoopFreedom<S>], d: &mut Derivatives<S>) {
+        let (nv, Some(b)) = (self.tree.dims.nv, k.velocity) else { return };
+        let Loop { constraint, closure, at, motion, .. } = of;
+        let (ratio, canonical) = (self.tree.nodes[k.node].ratio, constraint.canonical());
+        let psi = k.turn();
+        let turned = closure.direction_rates(at, &k.axis);
+        let bent = closure.bent_rates(at, motion, &k.axis, &psi);
+        let [f_k, turning_k] = [&turned, &bent].map(|e| wrench(e, of.sigma));
+        let phi = k.axis.cross_force(&of.f);
+        let chi = k.chi(motion, &of.f, &of.turning, &phi);
+        for a in path {
+            let Some(v) = a.velocity else { continue };
+            let both = self.tree.nodes[a.node].ratio * ratio;
+            let turned = a.turned_by(k);
+            let mirrored = canonical && a.node != k.node;
+            if mirrored && turned {
+                continue;
+            }
+            let (mut x, mut c) = (f_k.dot(&a.axis), turning_k.dot(&a.axis) - f_k.dot(&a.swing(motion)));
+            if turned {
+                x = x + phi.dot(&a.axis);
+                c = c + chi.dot(&a.axis) + phi.dot(&a.turn());
+            }
+            let bend = if canonical { &mut d.b } else { &mut d.closed.bend };
+            add(&mut bend[v * nv + b], both * x);
+            add(&mut d.dpd_dq[v * nv + b], both * c);
+            if mirrored {
+                add(&mut bend[b * nv + v], both * x);
+                add(&mut d.dpd_dq[b * nv + v], both * c);
+            }
+        }
+        let residuals = constraint.decay.map(|decay| {
+            let acts = self.if_acts(constraint.first, decay);
+            closure.residual_rates(at, &k.axis).map(|x| acts * x)
+        });
+        for (r, row) in constraint.range().enumerate() {
+            let held = residuals.filter(|_| constraint.holonomic(r)).map_or(S::zero(), |x| x[r]);
+            let x = of.directions[r].dot(&psi) + turned[r].dot(motion) + held;
+            add(&mut d.closed.rows[row * nv + b], ratio * x);
+        }
+    }
+
+    /// The part of a loop in `ṗ` of freedom `a`; and that in its momentum and in `Z`, where the constraint is not canonical.
+    fn loop_momentum(&self, of: &Loop<S>, a: &LoopFreedom<S>, d: &mut Derivatives<S>) {
+        let Some(v) = a.velocity else { return };
+        let (ratio, rows) = (self.tree.nodes[a.node].ratio, self.tree.dims.rows);
+        let swing = a.swing(&of.motion);
+        add(&mut d.pd[v], ratio * (of.turning.dot(&a.axis) - of.f.dot(&swing)));
+        if of.constraint.canonical() {
+            return;
+        }
+        add(&mut d.closed.held[v], -(ratio * of.f.dot(&a.axis)));
+        for (r, row) in of.constraint.range().enumerate() {
+            let x = of.rates[r].dot(&a.axis) - of.directions[r].dot(&swing);
+            add(&mut d.closed.z[v * rows + row], ratio * x);
+        }
     }
 
     /// `Y`, `Z` and the rest of `B⁺`, where a constraint is not canonical.
@@ -436,8 +371,4 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             }
         }
     }
-}
-
-fn scaled<S: Scalar>(m: &Motion<S>, x: S) -> Motion<S> {
-    Motion { lin: scale3(x, m.lin), ang: scale3(x, m.ang) }
 }

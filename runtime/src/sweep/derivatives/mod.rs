@@ -35,6 +35,7 @@
 
 mod closed;
 mod dense;
+mod loop_path;
 mod order;
 mod pairs;
 mod parameters;
