@@ -303,10 +303,13 @@ pub enum Closure<S> {
         /// Radii of the first and the second, m.
         radii: [S; 2],
     },
-    /// A ball about the second origin rolls on a box about the first, with its edges along the axes.
+    /// A ball about the second origin rolls on a box about the first, with its edges along the axes, or on what lies within
+    /// some distance of the box.
     RollingBallOnBox {
         /// Lengths of the edges of the box, m.
         size: [S; 3],
+        /// That distance, m: the radius of rounded edges and corners.
+        rounding: S,
         /// Radius of the ball, m.
         radius: S,
     },

@@ -396,7 +396,7 @@ impl Closer<'_> {
             }
             16 => {
                 let size = [0.5, 0.7, 0.9].map(|part| self.value(part * length));
-                LoopKind::RollingBallOnBox { size, radius: self.value(0.5 * length) }
+                LoopKind::RollingBallOnBox { size, rounding: 0.0, radius: self.value(0.5 * length) }
             }
             17 => {
                 let (axis, radii) = (self.direction(), [0.4, 0.6].map(|part| self.value(part * length)));
@@ -475,7 +475,7 @@ impl Closer<'_> {
                     break (turn, d);
                 }
             },
-            LoopKind::RollingBallOnBox { size, radius } => {
+            LoopKind::RollingBallOnBox { size, radius, .. } => {
                 let turn = self.any_turn();
                 (turn, touching::on_box(&mut self.rng, size.map(num), num(radius), self.distribution.planar))
             }

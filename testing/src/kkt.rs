@@ -249,10 +249,10 @@ fn touching<S: Real>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S>) 
             let axes = [a.direction(unit(p)), b.direction(unit(q))];
             Some((segments(axes, lengths.map(half), d), radii.map(num)))
         }
-        LoopKind::RollingBallOnBox { size, radius } => {
+        LoopKind::RollingBallOnBox { size, rounding, radius } => {
             let e = |k: usize| std::array::from_fn(|i| f64::from(u8::from(i == k)));
             let axes = [0, 1, 2].map(|k| a.direction(e(k)));
-            Some((on_box(axes, size.map(half), d), [0.0, num(radius)]))
+            Some((on_box(axes, size.map(half), d), [rounding, num(radius)]))
         }
         LoopKind::RollingBallOnCylinder { axis, length, radii: [p, q] } => {
             let nearest = on_cylinder(a.direction(unit(axis)), half(length), S::constant(num(p)), d);

@@ -100,7 +100,7 @@ impl Directions {
             ShapeKind::Capsule { radius, length } => {
                 self.hull(&[[0.0, 0.0, 0.5 * length], [0.0, 0.0, -0.5 * length]], radius)
             }
-            ShapeKind::Box { size } => cuboid(size),
+            ShapeKind::Box { size, .. } => cuboid(size),
             ShapeKind::Cylinder { radius, length } => cylinder(radius, length.max(0.02 * radius)),
             ShapeKind::Hull { ref points } => self.hull(points, 0.0),
             // Points, planes and height fields.
@@ -179,7 +179,7 @@ mod tests {
         let ball = 4.0 / 3.0 * std::f64::consts::PI;
         for (kind, exact) in [
             (ShapeKind::Sphere { radius: 1.0 }, ball),
-            (ShapeKind::Box { size: [1.0, 2.0, 3.0] }, 6.0),
+            (ShapeKind::Box { size: [1.0, 2.0, 3.0], rounding: 0.0 }, 6.0),
             (ShapeKind::Cylinder { radius: 1.0, length: 2.0 }, 2.0 * std::f64::consts::PI),
             (ShapeKind::Capsule { radius: 1.0, length: 2.0 }, ball + 2.0 * std::f64::consts::PI),
             (ShapeKind::Ellipsoid { semi_axes: [1.0, 2.0, 0.5] }, ball),

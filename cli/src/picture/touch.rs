@@ -138,7 +138,7 @@ fn surface(kind: &ShapeKind) -> Vec<[f64; 3]> {
             let rim = |z: f64| ellipsoid([0.0, 0.0, z], [radius, radius, 0.0]);
             [-0.5, 0.5].into_iter().flat_map(|end| rim(end * length)).collect()
         }
-        ShapeKind::Box { size } => {
+        ShapeKind::Box { size, .. } => {
             let side = |corner: usize, k: usize| if corner >> k & 1 == 0 { -0.5 * size[k] } else { 0.5 * size[k] };
             (0..8).map(|corner| [0, 1, 2].map(|k| side(corner, k))).collect()
         }

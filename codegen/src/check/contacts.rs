@@ -211,6 +211,10 @@ impl Pair {
         let origin = findings.origin(self.name.span);
         let many = places.len() > 1;
         let one = |(k, place): (usize, &Elementary)| {
+            let ([a, b], shapes) = match place.exchanged {
+                true => ([b, a], [shapes[1], shapes[0]]),
+                false => ([a, b], shapes),
+            };
             let (first, second) = (moved(&a.mount, place.first), moved(&b.mount, place.second));
             Contact {
                 name: if many { format!("{}/{}", self.name.value, k + 1) } else { self.name.value.clone() },
@@ -237,9 +241,14 @@ fn unsupported(pair: &Pair, [a, b]: [&Shape; 2], findings: &mut Findings) {
         }
         _ => false,
     };
-    let help = match simple(a) || simple(b) {
-        true => SUPPORTED.into(),
-        false => format!("{SUPPORTED}; describe one of the two by spheres or points"),
+    let boxes = matches!((&a.kind, &b.kind), (ShapeKind::Box { .. }, ShapeKind::Box { .. }));
+    let (message, help) = match (boxes, simple(a) || simple(b)) {
+        (true, _) => (
+            format!("{what}: two boxes with sharp edges cannot touch"),
+            "add `rounding = 0.001` to one of them: the radius of its edges and corners in metres, within its `size`".into(),
+        ),
+        (false, true) => (message, SUPPORTED.into()),
+        (false, false) => (message, format!("{SUPPORTED}; describe one of the two by spheres or points")),
     };
     findings.error(pair.at, message, help);
 }
@@ -293,16 +302,17 @@ fn all(
 #[cfg(feature = "height_fields")]
 fn tight([a, b]: [&Shape; 2], pair: &Pair, findings: &mut Findings) {
     use crate::field::fit;
-    let (field, ball, ground, radius) = match (&a.kind, &b.kind) {
-        (ShapeKind::HeightField { field, .. }, ShapeKind::Sphere { radius } | ShapeKind::Capsule { radius, .. }) => {
-            (*field, b, a, *radius)
-        }
-        (ShapeKind::Sphere { radius } | ShapeKind::Capsule { radius, .. }, ShapeKind::HeightField { field, .. }) => {
-            (*field, a, b, *radius)
-        }
+    let (field, ball, ground) = match (&a.kind, &b.kind) {
+        (ShapeKind::HeightField { field, .. }, _) => (*field, b, a),
+        (_, ShapeKind::HeightField { field, .. }) => (*field, a, b),
         _ => return,
     };
-    // What is not greater than zero was reported.
+    let radius = match ball.kind {
+        ShapeKind::Sphere { radius } | ShapeKind::Capsule { radius, .. } => radius,
+        ShapeKind::Box { rounding, .. } => rounding,
+        _ => return,
+    };
+    // Sharp corners follow all ground. What is not greater than zero otherwise was reported.
     if radius.is_nan() || radius <= 0.0 {
         return;
     }
@@ -334,7 +344,11 @@ const SMALL: &str = "where it can get to an edge, make the point a `sphere` with
 /// Whether one of two shapes is a point, which has no radius with which it could turn about an edge of the other.
 fn catches([a, b]: [&Shape; 2]) -> bool {
     let point = |s: &Shape| s.kind == ShapeKind::Point;
-    let edged = |s: &Shape| matches!(s.kind, ShapeKind::Box { .. } | ShapeKind::Cylinder { .. });
+    let edged = |s: &Shape| match s.kind {
+        ShapeKind::Box { rounding, .. } => rounding == 0.0,
+        ShapeKind::Cylinder { .. } => true,
+        _ => false,
+    };
     (point(a) && edged(b)) || (edged(a) && point(b))
 }
 

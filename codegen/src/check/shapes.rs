@@ -43,6 +43,7 @@ fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) 
         ("radius", raw.radius.as_ref().map(|x| x.span), "`radius = ..`, in metres"),
         ("length", raw.length.as_ref().map(|x| x.span), "`length = ..`, along its z axis in metres"),
         ("size", raw.size.as_ref().map(|x| x.span), "`size = [x, y, z]`, the lengths of its edges in metres"),
+        ("rounding", raw.rounding.as_ref().map(|x| x.span), ""),
         ("semi_axes", raw.semi_axes.as_ref().map(|x| x.span), "`semi_axes = [x, y, z]`, in metres"),
         ("normal", raw.normal.as_ref().map(|x| x.span), ""),
         ("points", listed("points"), ""),
@@ -104,7 +105,16 @@ fn kind(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) -> 
         }
         "box" => {
             let edges = raw.size.as_ref()?;
-            Some(ShapeKind::Box { size: [0, 1, 2].map(|k| size(&edges.value[k], "size", MORE, what, numbers)) })
+            let lengths = [0, 1, 2].map(|k| size(&edges.value[k], "size", MORE, what, numbers));
+            let rounding = raw.rounding.as_ref().map_or(0.0, |x| size(x, "rounding", SHARP, what, numbers));
+            // What is not greater than zero, or not a number, was reported.
+            let shortest = lengths.into_iter().fold(f64::INFINITY, f64::min);
+            if let (Some(given), true) = (&raw.rounding, shortest > 0.0 && 2.0 * rounding >= shortest) {
+                let message = format!("{what}: `rounding` leaves nothing of its shortest edge, {shortest} m");
+                let help = "write a radius below half of it: it is that of edges and corners, within `size`";
+                numbers.findings.error(given.span, message, help);
+            }
+            Some(ShapeKind::Box { size: lengths, rounding })
         }
         "ellipsoid" => {
             let axes = raw.semi_axes.as_ref()?;
@@ -152,6 +162,7 @@ fn height_field(raw: &RawShape, what: &str, numbers: &mut Numbers) -> Option<Sha
 }
 
 const MORE: &str = "write a length in metres, greater than 0";
+const SHARP: &str = "write a radius in metres; 0 leaves edges sharp";
 const DISC: &str = "write a length in metres; 0 makes it a thin disc";
 
 /// A length that is not negative, and not zero where `help` does not allow it.

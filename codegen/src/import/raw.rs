@@ -326,6 +326,8 @@ pub struct RawShape {
     pub length: Option<RawNumber>,
     /// Lengths of edges, m.
     pub size: Option<RawVec3>,
+    /// Radius of edges and corners, m.
+    pub rounding: Option<RawNumber>,
     /// Semi-axes of an ellipsoid, m.
     pub semi_axes: Option<RawVec3>,
     /// Direction across a plane; z where `None`.
@@ -369,6 +371,7 @@ impl RawShape {
             radius: None,
             length: None,
             size: None,
+            rounding: None,
             semi_axes: None,
             normal: None,
             hull: None,

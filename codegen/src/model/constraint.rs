@@ -125,6 +125,9 @@ pub enum LoopKind {
     RollingBallOnBox {
         /// Lengths of the edges along x, y and z, m.
         size: [Value; 3],
+        /// By how much the box is larger on all sides, with rounded edges and corners of this radius, m. Contacts have such
+        /// boxes; loops in models do not.
+        rounding: f64,
         /// Radius of the ball, m.
         radius: Value,
     },
@@ -388,7 +391,7 @@ pub static LOOPS: [LoopSpec; 21] = [
         rows: &[M, M, M],
         make: |n| {
             let [x, y, z, radius, ..] = n.numbers;
-            LoopKind::RollingBallOnBox { size: [x, y, z], radius }
+            LoopKind::RollingBallOnBox { size: [x, y, z], rounding: 0.0, radius }
         },
         ..PLAIN
     },
@@ -515,7 +518,7 @@ impl LoopKind {
             LoopKind::RollingEllipsoid { semi_axes, .. } => semi_axes.iter_mut().collect(),
             LoopKind::RollingBalls { radii } => radii.iter_mut().collect(),
             LoopKind::RollingCapsules { lengths, radii, .. } => lengths.iter_mut().chain(radii).collect(),
-            LoopKind::RollingBallOnBox { size, radius } => size.iter_mut().chain([radius]).collect(),
+            LoopKind::RollingBallOnBox { size, radius, .. } => size.iter_mut().chain([radius]).collect(),
             LoopKind::RollingBallOnCylinder { length, radii, .. } => [length].into_iter().chain(radii).collect(),
             #[cfg(feature = "height_fields")]
             LoopKind::RollingBallOnField { ball, .. } => ball.iter_mut().map(|ball| &mut ball.radius).collect(),
@@ -544,7 +547,9 @@ impl LoopKind {
             LoopKind::RollingEllipsoid { semi_axes, .. } => Closure::RollingEllipsoid { semi_axes },
             LoopKind::RollingBalls { radii } => Closure::RollingBalls { radii },
             LoopKind::RollingCapsules { lengths, radii, .. } => Closure::RollingCapsules { lengths, radii },
-            LoopKind::RollingBallOnBox { size, radius } => Closure::RollingBallOnBox { size, radius },
+            LoopKind::RollingBallOnBox { size, rounding, radius } => {
+                Closure::RollingBallOnBox { size, rounding: Value::Const(rounding), radius }
+            }
             LoopKind::RollingBallOnCylinder { length, radii, .. } => Closure::RollingBallOnCylinder { length, radii },
             #[cfg(feature = "height_fields")]
             LoopKind::RollingBallOnField { field, ball } => Closure::RollingBallOnField { field, ball },

@@ -49,8 +49,10 @@ pub enum ShapeKind {
     },
     /// A cuboid.
     Box {
-        /// Lengths of its edges along x, y and z, m.
+        /// Its lengths along x, y and z, m.
         size: [f64; 3],
+        /// Radius of its edges and corners, m; 0 where they are sharp.
+        rounding: f64,
     },
     /// A cylinder about z; a thin disc where its length is zero.
     Cylinder {
@@ -90,7 +92,7 @@ pub enum ShapeKind {
 pub struct ShapeSpec {
     /// Its words.
     pub words: Words,
-    /// Keys of its dimensions: `radius`, `length`, `size`, `semi_axes` `normal`, `points`,
+    /// Keys of its dimensions: `radius`, `length`, `size`, `rounding`, `semi_axes` `normal`, `points`,
     /// `file`, `scale`, `most`, `spacing` or `heights`.
     pub keys: &'static [&'static str],
 }
@@ -100,7 +102,7 @@ pub static SHAPES: &[ShapeSpec] = &[
     ShapeSpec { words: Words::new("point", &[], &["vertex", "corner"]), keys: &[] },
     ShapeSpec { words: Words::new("sphere", &[], &["ball"]), keys: &["radius"] },
     ShapeSpec { words: Words::new("capsule", &[], &["pill"]), keys: &["radius", "length"] },
-    ShapeSpec { words: Words::new("box", &[], &["cube", "cuboid", "block"]), keys: &["size"] },
+    ShapeSpec { words: Words::new("box", &[], &["cube", "cuboid", "block"]), keys: &["size", "rounding"] },
     ShapeSpec { words: Words::new("cylinder", &[], &["disc", "disk", "wheel"]), keys: &["radius", "length"] },
     ShapeSpec { words: Words::new("ellipsoid", &[], &["egg", "spheroid"]), keys: &["semi_axes"] },
     ShapeSpec { words: Words::new("plane", &[], &["floor", "wall", "half_space", "halfspace"]), keys: &["normal"] },
@@ -169,7 +171,7 @@ mod tests {
             ShapeKind::Point,
             ShapeKind::Sphere { radius },
             ShapeKind::Capsule { radius, length },
-            ShapeKind::Box { size: [1.0, 2.0, 3.0] },
+            ShapeKind::Box { size: [1.0, 2.0, 3.0], rounding: 0.0 },
             ShapeKind::Cylinder { radius, length },
             ShapeKind::Ellipsoid { semi_axes: [1.0, 2.0, 3.0] },
             ShapeKind::Plane { normal },

@@ -54,7 +54,7 @@ fn every_type_is_read() {
         ("marbles", LoopKind::RollingBalls { radii: [C(0.1), lead] }),
         ("stone", LoopKind::RollingEllipsoid { normal: Z, semi_axes: [C(0.1), C(0.2), lead] }),
         ("pills", LoopKind::RollingCapsules { axes: [X, Z], lengths: [C(0.3), C(0.0)], radii: [C(0.1), lead] }),
-        ("die", LoopKind::RollingBallOnBox { size: [C(0.1), C(0.2), lead], radius: C(0.05) }),
+        ("die", LoopKind::RollingBallOnBox { size: [C(0.1), C(0.2), lead], rounding: 0.0, radius: C(0.05) }),
         ("drum", LoopKind::RollingBallOnCylinder { axis: Y, length: C(0.4), radii: [C(0.1), C(0.2)] }),
         ("skate", LoopKind::KnifeEdge { axis: Y }),
         ("odd", LoopKind::Pfaffian { row: [C(1.0), C(0.0), C(0.0), C(0.0), C(0.0), lead] }),

@@ -38,7 +38,9 @@ fn radii<S: Real>(closure: &Closure<S>) -> Option<(Option<f64>, f64)> {
             let [a, b] = [0, 1].map(|k: usize| 0.5 * lengths[k].abs().to_f64() + radii[k].abs().to_f64());
             (Some(a), b)
         }
-        Closure::RollingBallOnBox { size, radius } => (Some(0.5 * length(*size)), radius.abs().to_f64()),
+        Closure::RollingBallOnBox { size, rounding, radius } => {
+            (Some(0.5 * length(*size) + rounding.abs().to_f64()), radius.abs().to_f64())
+        }
         Closure::RollingBallOnCylinder { length: l, radii: [a, b] } => {
             (Some(length([S::constant(0.5) * *l, *a])), b.abs().to_f64())
         }

@@ -262,7 +262,9 @@ impl<S: Scalar> Closure<S> {
         match self {
             Closure::RollingBalls { radii } => Some(Touch::balls(at, radii)),
             Closure::RollingCapsules { lengths, radii } => Some(Touch::capsules(at, lengths, radii)),
-            Closure::RollingBallOnBox { size, radius } => Some(Touch::ball_on_box(at, size, *radius)),
+            Closure::RollingBallOnBox { size, rounding, radius } => {
+                Some(Touch::ball_on_box(at, size, &[*rounding, *radius]))
+            }
             Closure::RollingBallOnCylinder { length, radii } => Some(Touch::ball_on_cylinder(at, *length, radii)),
             #[cfg(feature = "height_fields")]
             Closure::RollingBallOnField { field, ball } => Some(Touch::ball_on_field(at, field, *ball)),

@@ -71,13 +71,14 @@ impl<S: Scalar> Touch<S> {
         Touch::new(middle, add3(add3(d, middle), scale3(-there, z)), radii)
     }
 
-    /// A ball about the origin of `B` on a box about that of `A`, with edges of these lengths along its axes.
-    pub fn ball_on_box(at: &Relative<S>, size: &[S; 3], radius: S) -> Touch<S> {
+    /// A ball about the origin of `B` on a box about that of `A`, with edges of these lengths along its axes; `radii` by
+    /// which the box is larger on all sides, with rounded edges and corners, and of the ball.
+    pub fn ball_on_box(at: &Relative<S>, size: &[S; 3], radii: &[S; 2]) -> Touch<S> {
         let mut faces = [(S::zero(), [S::zero(); 3]); 3];
         for (k, face) in faces.iter_mut().enumerate() {
             *face = ends(at.axis(k), at.d, size[k]);
         }
-        Touch::ball_on_faces(&faces, radius)
+        Touch::ball_on_faces(&faces, radii)
     }
 
     /// A ball about the origin of `B` on a cylinder about that of `A` and its z; `radii` of the cylinder and the ball.
@@ -86,7 +87,7 @@ impl<S: Scalar> Touch<S> {
         // On the axis itself there is no direction across it: the addend gives zero.
         let distance = (dot3(across, across) + S::constant(1e-36)).sqrt();
         let mantle = (distance - radii[0], scale3(S::one() / distance, across));
-        Touch::ball_on_faces(&[mantle, ends(at.axis(2), at.d, length)], radii[1])
+        Touch::ball_on_faces(&[mantle, ends(at.axis(2), at.d, length)], &[S::zero(), radii[1]])
     }
 
     /// A ball about the origin of `B`, or this origin itself, on a height field in the axes of `A`. The gap is the way down along
@@ -108,8 +109,9 @@ impl<S: Scalar> Touch<S> {
 
     /// A ball about the origin of `B` on a body that is behind all of some faces, which are at right angles to each other:
     /// for each face how far before it the middle is, m, and its normal. Outside, the distance of the middle is that of
-    /// the face, edge or corner that is nearest; inside, it is that of the nearest face, negative.
-    fn ball_on_faces<const N: usize>(faces: &[(S, Vec3<S>); N], radius: S) -> Touch<S> {
+    /// the face, edge or corner that is nearest; inside, it is that of the nearest face, negative. `radii` by which the body
+    /// is larger, and of the ball.
+    fn ball_on_faces<const N: usize>(faces: &[(S, Vec3<S>); N], radii: &[S; 2]) -> Touch<S> {
         let (mut inside, mut largest) = (S::one(), faces[0].0);
         // 1 for the face that is the nearest from inside.
         let mut nearest = [S::zero(); N];
@@ -133,7 +135,7 @@ impl<S: Scalar> Touch<S> {
         let length = square.sqrt();
         let normal = scale3(S::one() / length, normal);
         let distance = (S::one() - inside) * length + inside * largest;
-        Touch { gap: distance - radius, normal, at: scale3(-radius, normal) }
+        Touch { gap: distance - (radii[0] + radii[1]), normal, at: scale3(-radii[1], normal) }
     }
 }
 

@@ -145,8 +145,8 @@ impl<S: Copy> Closure<S> {
             Closure::RollingCapsules { lengths, radii } => {
                 Closure::RollingCapsules { lengths: lengths.map(&mut of), radii: radii.map(of) }
             }
-            Closure::RollingBallOnBox { size, radius } => {
-                Closure::RollingBallOnBox { size: size.map(&mut of), radius: of(radius) }
+            Closure::RollingBallOnBox { size, rounding, radius } => {
+                Closure::RollingBallOnBox { size: size.map(&mut of), rounding: of(rounding), radius: of(radius) }
             }
             Closure::RollingBallOnCylinder { length, radii } => {
                 Closure::RollingBallOnCylinder { length: of(length), radii: radii.map(of) }

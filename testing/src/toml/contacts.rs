@@ -23,7 +23,10 @@ impl Writer<'_> {
                     line(out, "radius", format!("{radius:?}"));
                     line(out, "length", format!("{length:?}"));
                 }
-                ShapeKind::Box { size } => line(out, "size", format!("{size:?}")),
+                ShapeKind::Box { size, rounding } => {
+                    line(out, "size", format!("{size:?}"));
+                    line(out, "rounding", format!("{rounding:?}"));
+                }
                 ShapeKind::Ellipsoid { semi_axes } => line(out, "semi_axes", format!("{semi_axes:?}")),
                 ShapeKind::Plane { normal } => line(out, "normal", format!("{normal:?}")),
                 ShapeKind::HeightField { field, heights } => {

@@ -1,6 +1,7 @@
 //! Motions with contacts against their known answers.
 
 mod answers;
+mod boxes;
 mod edges;
 mod far;
 mod fields;

@@ -197,12 +197,20 @@ pub(super) fn later(scene: &mut Scene, q: &[f64], v: &[f64], h: f64) -> Vec<f64>
     q
 }
 
-/// Rate of the gap by a difference quotient.
+/// Rate of the first gap by a difference quotient.
 pub(super) fn gap_rate(scene: &mut Scene, q: &[f64], v: &[f64]) -> f64 {
+    gap_rate_of(scene, q, v, 0)
+}
+
+/// Rate of the residual of a row by a difference quotient.
+pub(super) fn gap_rate_of(scene: &mut Scene, q: &[f64], v: &[f64], row: usize) -> f64 {
     let h = 1e-5;
     let [ahead, behind] = [h, -h].map(|h| {
-        let q = later(scene, q, v, h);
-        rows(scene, &q, v).gap
+        let (q, v) = (later(scene, q, v, h), v.to_vec());
+        let system = scene.system.system_mut();
+        let (mut gaps, mut rates, mut entries) = (system.zero_rows(), system.zero_rows(), system.zero_entries());
+        system.gaps(0.0, &q, &v, &mut gaps, &mut rates, &mut entries);
+        gaps[row]
     });
     (ahead - behind) * 0.5 / h
 }

@@ -90,7 +90,11 @@ fn loop_kind(model: &Model, rng: &mut Rng) -> LoopKind {
         13 => LoopKind::RollingBall { normal, radius: size },
         14 => LoopKind::RollingBalls { radii: [size, value(model, rng, 0.1, 1.0)] },
         15 => LoopKind::RollingCapsules { axes: [axis, normal], lengths: [Value::ZERO, size], radii: [size; 2] },
-        16 => LoopKind::RollingBallOnBox { size: [size, value(model, rng, 0.1, 1.0), Value::ONE], radius: size },
+        16 => LoopKind::RollingBallOnBox {
+            size: [size, value(model, rng, 0.1, 1.0), Value::ONE],
+            rounding: 0.0,
+            radius: size,
+        },
         17 => LoopKind::RollingBallOnCylinder { axis, length: size, radii: [Value::ONE, size] },
         18 => LoopKind::KnifeEdge { axis },
         19 => LoopKind::RollingEllipsoid { normal, semi_axes: [size, Value::ONE, size] },

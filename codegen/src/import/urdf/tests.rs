@@ -244,7 +244,7 @@ fn shapes_are_read_and_touch_a_floor_that_is_asked_for() {
     let names: Vec<&str> = free.shapes.iter().map(|s| s.name.as_str()).collect();
     assert_eq!(names, ["base", "base_shape_2", "foot", "foot_shape_2"]);
     let [radius, length] = [0.2, 0.3];
-    assert_eq!(free.shapes[0].kind, ShapeKind::Box { size: [1.0, 2.0, 3.0] });
+    assert_eq!(free.shapes[0].kind, ShapeKind::Box { size: [1.0, 2.0, 3.0], rounding: 0.0 });
     assert_eq!(free.shapes[1].kind, ShapeKind::Sphere { radius: 0.5 });
     assert_eq!(consts(free.shapes[1].mount.placement.xyz), [1.0, 2.0, 3.0]);
     assert_eq!(free.shapes[1].mount.placement.rotation, Rotation::Rpy([0.1, 0.2, 0.3].map(Value::Const)));
