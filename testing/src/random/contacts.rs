@@ -12,7 +12,7 @@ fn shape(rng: &mut Rng, name: &str, body: Option<&str>, kind: usize) -> String {
         0 => "type = \"point\"".to_string(),
         1 => "type = \"sphere\"\nradius = 0.1".to_string(),
         2 => "type = \"capsule\"\nradius = 0.05\nlength = 0.4".to_string(),
-        3 => "type = \"box\"\nsize = [0.3, 0.2, 0.5]".to_string(),
+        3 => "type = \"box\"\nsize = [0.3, 0.2, 0.5]\nrounding = 0.02".to_string(),
         4 => "type = \"cylinder\"\nradius = 0.15\nlength = 0.3".to_string(),
         5 => "type = \"ellipsoid\"\nsemi_axes = [0.1, 0.2, 0.3]".to_string(),
         _ => "type = \"plane\"".to_string(),
@@ -43,7 +43,7 @@ pub fn with_contacts(seed: u64) -> Option<Model> {
         if first == Some(second) {
             continue;
         }
-        let kinds = rng.pick(&[[6, 0], [6, 1], [6, 2], [6, 3], [6, 4], [6, 5], [1, 1], [2, 2], [3, 1], [4, 0]]);
+        let kinds = rng.pick(&[[6, 0], [6, 1], [6, 2], [6, 3], [6, 4], [6, 5], [1, 1], [2, 2], [3, 1], [3, 2], [4, 0]]);
         let more = [
             shape(&mut rng, &format!("s{k}a"), first.map(|i| names[i]), kinds[0]),
             shape(&mut rng, &format!("s{k}b"), Some(names[second]), kinds[1]),

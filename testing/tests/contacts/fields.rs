@@ -271,12 +271,15 @@ fn a_ball_lies_in_a_hollow() {
     assert_eq!(scene.system.modes(), [Mode::Stick]);
 }
 
-/// Coordinates and momenta of a shipped scene at its end, and its steps by what served them.
-fn end<Y>(mut mechanism: Y, plan: &Plan, time: f64) -> (Vec<f64>, Vec<f64>, [u64; 5])
+/// Coordinates and momenta a `time` after given coordinates and velocities, and the steps by what served them.
+pub(super) fn end<Y>(
+    mut mechanism: Y,
+    (mut q, v): (Vec<f64>, Vec<f64>),
+    time: f64,
+) -> (Vec<f64>, Vec<f64>, [u64; 5])
 where
     Y: Touching<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>> + Conjugate,
 {
-    let (mut q, v) = (plan.start(), plan.start_velocity().expect("it moves"));
     let mut p = v.clone();
     mechanism.conjugate_momenta(&q, &v, &mut p);
     let mut system = WithContacts::new(mechanism);
@@ -292,9 +295,10 @@ where
 fn machine_code_looks_up_what_the_interpreter_does() {
     let model = model(include_str!("../../../models/contacts/ball_on_hills.toml"));
     let plan = Plan::new(&model, 1e-9);
-    let (q, p, _) = end(plan.default_contact_interpreter::<f64>(), &plan, 1.5);
+    let start = (plan.start(), plan.start_velocity().expect("it moves"));
+    let (q, p, _) = end(plan.default_contact_interpreter::<f64>(), start.clone(), 1.5);
     let options = Options { arithmetic: Arithmetic::Exact, ..Options::default() };
-    let (other_q, other_p, steps) = end(plan.compiled_with_contacts::<f64>(&options, 10).unwrap(), &plan, 1.5);
+    let (other_q, other_p, steps) = end(plan.compiled_with_contacts::<f64>(&options, 10).unwrap(), start, 1.5);
     println!("{steps:?} steps");
     // In flight and on the ground, all but the first steps.
     assert!(steps[Way::Compiled as usize] > 3 * steps[Way::Interpreted as usize], "{steps:?}");
