@@ -88,7 +88,7 @@ fn shapes(scene: &Scene, colours: &[usize], frame: &dyn Fn(Option<usize>) -> Str
             ShapeKind::Ellipsoid { semi_axes } => semi_axes.to_vec(),
             ShapeKind::Plane { normal } => normal.to_vec(),
             // How far it extends along its axes.
-            ShapeKind::Hull { points } => {
+            ShapeKind::Hull { points, .. } => {
                 [0, 1, 2].map(|k| points.iter().fold(0.0, |most: f64, p| most.max(2.0 * p[k].abs()))).to_vec()
             }
         };

@@ -22,6 +22,8 @@ pub mod contact;
 mod dual;
 mod error;
 pub mod field;
+#[cfg(feature = "hulls")]
+pub mod hull;
 pub mod integrate;
 #[cfg(feature = "alloc")]
 pub mod interp;

@@ -13,6 +13,8 @@ use alloc::vec::Vec;
 
 #[cfg(feature = "height_fields")]
 use crate::field::{Ball, Field};
+#[cfg(feature = "hulls")]
+use crate::hull::Polyhedron;
 use crate::spatial::{ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::Scalar;
 
@@ -308,6 +310,17 @@ pub enum Closure<S> {
     RollingBallOnBox {
         /// Lengths of the edges of the box, m.
         size: [S; 3],
+        /// That distance, m: the radius of rounded edges and corners.
+        rounding: S,
+        /// Radius of the ball, m.
+        radius: S,
+    },
+    /// A ball about the second origin rolls on a convex polyhedron in the axes of the first frame, or on what lies within
+    /// some distance of it.
+    #[cfg(feature = "hulls")]
+    RollingBallOnHull {
+        /// The polyhedron.
+        hull: &'static Polyhedron,
         /// That distance, m: the radius of rounded edges and corners.
         rounding: S,
         /// Radius of the ball, m.

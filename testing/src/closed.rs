@@ -484,7 +484,9 @@ impl Closer<'_> {
                 let (length, flat) = (num(length), self.distribution.planar);
                 (turn, touching::on_cylinder(&mut self.rng, axis, length, radii.map(num), flat))
             }
-            LoopKind::RollingBallOnField { .. } => unreachable!("loops are of the kinds that models can have"),
+            LoopKind::RollingBallOnField { .. } | LoopKind::RollingBallOnHull { .. } => {
+                unreachable!("loops are of the kinds that models can have")
+            }
             LoopKind::KnifeEdge { .. } | LoopKind::Pfaffian { .. } => {
                 let anywhere = self.direction();
                 (self.any_turn(), along(anywhere, slide))

@@ -102,7 +102,7 @@ impl Directions {
             }
             ShapeKind::Box { size, .. } => cuboid(size),
             ShapeKind::Cylinder { radius, length } => cylinder(radius, length.max(0.02 * radius)),
-            ShapeKind::Hull { ref points } => self.hull(points, 0.0),
+            ShapeKind::Hull { ref points, rounding } => self.hull(points, rounding),
             // Points, planes and height fields.
             _ => Mesh::new(),
         }
@@ -183,7 +183,13 @@ mod tests {
             (ShapeKind::Cylinder { radius: 1.0, length: 2.0 }, 2.0 * std::f64::consts::PI),
             (ShapeKind::Capsule { radius: 1.0, length: 2.0 }, ball + 2.0 * std::f64::consts::PI),
             (ShapeKind::Ellipsoid { semi_axes: [1.0, 2.0, 0.5] }, ball),
-            (ShapeKind::Hull { points: vec![[0.0; 3], [6.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] }, 1.0),
+            (
+                ShapeKind::Hull {
+                    points: vec![[0.0; 3], [6.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+                    rounding: 0.0,
+                },
+                1.0,
+            ),
         ] {
             let found = volume(&all.shape(&kind));
             // Corners on the surface leave out a few percent.

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use mbd_runtime::contact::RestitutionLaw;
 
-use super::elementary::{elementary, moved, Elementary, SUPPORTED};
+use super::elementary::{elementary, moved, Elementary, Rounded, MOST, SUPPORTED};
 use super::loops::{led, merged};
 use super::numbers::{Numbers, Quantity};
 use super::shapes::a as with_article;
@@ -230,6 +230,14 @@ impl Pair {
     }
 }
 
+/// Why nothing is known of the faces of a hull.
+#[cfg(feature = "hulls")]
+const NO_FACES: &str =
+    "the corners of the hull lie on a line, or rounding does not tell which of them are on one face: leave \
+                        some out, or write a smaller `most`";
+#[cfg(not(feature = "hulls"))]
+use crate::import::hull::WITHOUT as NO_FACES;
+
 fn unsupported(pair: &Pair, [a, b]: [&Shape; 2], findings: &mut Findings) {
     let what = format!("contact {}", quote(&pair.name.value));
     let message = format!("{what}: {} and {} cannot touch", with_article(a.kind.word()), with_article(b.kind.word()));
@@ -241,14 +249,23 @@ fn unsupported(pair: &Pair, [a, b]: [&Shape; 2], findings: &mut Findings) {
         }
         _ => false,
     };
-    let boxes = matches!((&a.kind, &b.kind), (ShapeKind::Box { .. }, ShapeKind::Box { .. }));
-    let (message, help) = match (boxes, simple(a) || simple(b)) {
-        (true, _) => (
-            format!("{what}: two boxes with sharp edges cannot touch"),
-            "add `rounding = 0.001` to one of them: the radius of its edges and corners in metres, within its `size`".into(),
-        ),
-        (false, true) => (message, SUPPORTED.into()),
-        (false, false) => (message, format!("{SUPPORTED}; describe one of the two by spheres or points")),
+    let solid =
+        |s: &Shape| matches!(s.kind, ShapeKind::Capsule { .. } | ShapeKind::Box { .. } | ShapeKind::Hull { .. });
+    let faceless = |s: &Shape| matches!(s.kind, ShapeKind::Hull { .. }) && Rounded::new(&s.kind).is_none();
+    let meets = |s: &Shape| solid(s) || matches!(s.kind, ShapeKind::Point | ShapeKind::Sphere { .. });
+    let (message, help) = match (Rounded::new(&a.kind), Rounded::new(&b.kind)) {
+        (Some(first), Some(second)) if first.contacts(&second) > MOST => {
+            let n = first.contacts(&second);
+            let message = format!("{what}: corners and edges of both are {n} contacts, more than {MOST}");
+            (message, "give a hull fewer corners by `most`".into())
+        }
+        (Some(_), Some(_)) => {
+            let help = "add `rounding = 0.001` to one of them: the radius of its edges and corners in metres";
+            (format!("{message}: the edges of both are sharp"), help.into())
+        }
+        _ if meets(a) && meets(b) && (faceless(a) || faceless(b)) => (message, NO_FACES.into()),
+        _ if simple(a) || simple(b) => (message, SUPPORTED.into()),
+        _ => (message, format!("{SUPPORTED}; describe one of the two by spheres or points")),
     };
     findings.error(pair.at, message, help);
 }
@@ -309,7 +326,7 @@ fn tight([a, b]: [&Shape; 2], pair: &Pair, findings: &mut Findings) {
     };
     let radius = match ball.kind {
         ShapeKind::Sphere { radius } | ShapeKind::Capsule { radius, .. } => radius,
-        ShapeKind::Box { rounding, .. } => rounding,
+        ShapeKind::Box { rounding, .. } | ShapeKind::Hull { rounding, .. } => rounding,
         _ => return,
     };
     // Sharp corners follow all ground. What is not greater than zero otherwise was reported.
@@ -345,7 +362,7 @@ const SMALL: &str = "where it can get to an edge, make the point a `sphere` with
 fn catches([a, b]: [&Shape; 2]) -> bool {
     let point = |s: &Shape| s.kind == ShapeKind::Point;
     let edged = |s: &Shape| match s.kind {
-        ShapeKind::Box { rounding, .. } => rounding == 0.0,
+        ShapeKind::Box { rounding, .. } | ShapeKind::Hull { rounding, .. } => rounding == 0.0,
         ShapeKind::Cylinder { .. } => true,
         _ => false,
     };

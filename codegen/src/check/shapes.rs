@@ -126,7 +126,8 @@ fn kind(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) -> 
             let at = raw.hull.as_ref()?.keys.first().map_or(raw.name.span, |(_, span)| *span);
             let far = points.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
             numbers.value(&RawNumber::constant(far, at), Quantity::Length, &format!("{what}: a point"));
-            Some(ShapeKind::Hull { points })
+            let rounding = raw.rounding.as_ref().map_or(0.0, |x| size(x, "rounding", SHARP, what, numbers));
+            Some(ShapeKind::Hull { points, rounding })
         }
         #[cfg(feature = "height_fields")]
         "height_field" => height_field(raw, what, numbers),

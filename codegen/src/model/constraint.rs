@@ -5,6 +5,8 @@
 
 #[cfg(feature = "height_fields")]
 use mbd_runtime::field::{Ball, Field};
+#[cfg(feature = "hulls")]
+use mbd_runtime::hull::Polyhedron;
 use mbd_runtime::spatial::Axis;
 use mbd_runtime::tree::Closure;
 
@@ -149,6 +151,17 @@ pub enum LoopKind {
         /// The ball; none for a point.
         ball: Option<Ball<Value>>,
     },
+    /// A ball about the second frame's origin rolls without slip on a convex polyhedron in the axes of the first. Contacts are
+    /// of this kind; loops in models are not.
+    #[cfg(feature = "hulls")]
+    RollingBallOnHull {
+        /// The polyhedron.
+        hull: &'static Polyhedron,
+        /// By how much it is larger on all sides, with rounded edges and corners of this radius, m.
+        rounding: f64,
+        /// Radius of the ball, m.
+        radius: Value,
+    },
     /// The second origin does not move along a direction fixed in the second frame.
     KnifeEdge {
         /// Direction across the edge.
@@ -269,6 +282,10 @@ use Stands::{InBoth, InFirst, InSecond};
 #[cfg(feature = "height_fields")]
 static ON_FIELD: LoopSpec =
     LoopSpec { words: Words::new("rolling_ball_on_field", &[], &[]), rows: &[M, M, M], ..PLAIN };
+
+/// What rolls on hulls, which is no kind of loop in models either.
+#[cfg(feature = "hulls")]
+static ON_HULL: LoopSpec = LoopSpec { words: Words::new("rolling_ball_on_hull", &[], &[]), rows: &[M, M, M], ..PLAIN };
 
 /// Every kind of loop that models can have, in the order of the variants of [`LoopKind`].
 pub static LOOPS: [LoopSpec; 21] = [
@@ -467,6 +484,8 @@ impl LoopKind {
             LoopKind::RollingBallOnCylinder { .. } => 18,
             #[cfg(feature = "height_fields")]
             LoopKind::RollingBallOnField { .. } => return &ON_FIELD,
+            #[cfg(feature = "hulls")]
+            LoopKind::RollingBallOnHull { .. } => return &ON_HULL,
             LoopKind::KnifeEdge { .. } => 19,
             LoopKind::Pfaffian { .. } => 20,
         };
@@ -504,6 +523,8 @@ impl LoopKind {
             | LoopKind::Pfaffian { .. } => Vec::new(),
             #[cfg(feature = "height_fields")]
             LoopKind::RollingBallOnField { .. } => Vec::new(),
+            #[cfg(feature = "hulls")]
+            LoopKind::RollingBallOnHull { .. } => Vec::new(),
         }
     }
 
@@ -522,6 +543,8 @@ impl LoopKind {
             LoopKind::RollingBallOnCylinder { length, radii, .. } => [length].into_iter().chain(radii).collect(),
             #[cfg(feature = "height_fields")]
             LoopKind::RollingBallOnField { ball, .. } => ball.iter_mut().map(|ball| &mut ball.radius).collect(),
+            #[cfg(feature = "hulls")]
+            LoopKind::RollingBallOnHull { radius, .. } => vec![radius],
             LoopKind::Pfaffian { row } => row.iter_mut().collect(),
             _ => Vec::new(),
         }
@@ -553,6 +576,10 @@ impl LoopKind {
             LoopKind::RollingBallOnCylinder { length, radii, .. } => Closure::RollingBallOnCylinder { length, radii },
             #[cfg(feature = "height_fields")]
             LoopKind::RollingBallOnField { field, ball } => Closure::RollingBallOnField { field, ball },
+            #[cfg(feature = "hulls")]
+            LoopKind::RollingBallOnHull { hull, rounding, radius } => {
+                Closure::RollingBallOnHull { hull, rounding: Value::Const(rounding), radius }
+            }
             LoopKind::KnifeEdge { .. } => Closure::KnifeEdge,
             LoopKind::Pfaffian { row } => Closure::Pfaffian { row },
         }

@@ -71,10 +71,12 @@ pub enum ShapeKind {
         /// Direction out of it, of any length but zero.
         normal: [f64; 3],
     },
-    /// The convex hull of points.
+    /// The convex hull of points, or of balls about them.
     Hull {
         /// Its corners, m.
         points: Vec<[f64; 3]>,
+        /// Radius of the balls, and so of its edges and corners, m; 0 where these are sharp.
+        rounding: f64,
     },
     /// Ground below a smooth surface `z = h(x, y)`.
     #[cfg(feature = "height_fields")]
@@ -108,7 +110,7 @@ pub static SHAPES: &[ShapeSpec] = &[
     ShapeSpec { words: Words::new("plane", &[], &["floor", "wall", "half_space", "halfspace"]), keys: &["normal"] },
     ShapeSpec {
         words: Words::new("hull", &[], &["mesh", "convex", "convex_hull", "polyhedron"]),
-        keys: &["points", "file", "scale", "most"],
+        keys: &["points", "file", "scale", "most", "rounding"],
     },
     #[cfg(feature = "height_fields")]
     ShapeSpec {
@@ -175,7 +177,7 @@ mod tests {
             ShapeKind::Cylinder { radius, length },
             ShapeKind::Ellipsoid { semi_axes: [1.0, 2.0, 3.0] },
             ShapeKind::Plane { normal },
-            ShapeKind::Hull { points: vec![[0.0; 3]] },
+            ShapeKind::Hull { points: vec![[0.0; 3]], rounding: 0.0 },
             ShapeKind::HeightField {
                 field: crate::field::field([1.0; 2], &[[0.0; 4]; 4].map(Vec::from)),
                 heights: [[0.0; 4]; 4].map(Vec::from).into(),

@@ -118,14 +118,14 @@ fn meshes_of_a_box_have_its_corners() {
     for (name, bytes) in [("box.stl", binary(&all)), ("box.STL", text(&all)), ("box.obj", obj(&all))] {
         let (m, findings) = clean(&model(&format!("type = 'hull'\nfile = 'meshes/{name}'")), &bytes);
         assert!(findings.contains(&format!("`meshes/{name}` has 144 points; their hull has 8 corners")), "{findings}");
-        let ShapeKind::Hull { points } = &m.shapes[1].kind else { panic!("no hull") };
+        let ShapeKind::Hull { points, .. } = &m.shapes[1].kind else { panic!("no hull") };
         let mut sorted = points.clone();
         sorted.sort_by(|a, b| a.iter().rev().partial_cmp(b.iter().rev()).expect("numbers"));
         assert_eq!(sorted, corners());
         found.push(points.clone());
         let (scaled, _) = clean(&model(&format!("type = 'hull'\nfile = 'meshes/{name}'\nscale = 0.001")), &bytes);
         let small: Vec<[f64; 3]> = points.iter().map(|p| p.map(|x| x * 0.001)).collect();
-        assert_eq!(scaled.shapes[1].kind, ShapeKind::Hull { points: small });
+        assert_eq!(scaled.shapes[1].kind, ShapeKind::Hull { points: small, rounding: 0.0 });
     }
     assert!(found.iter().all(|points| *points == found[0]));
 }
@@ -259,7 +259,7 @@ fn meshes_of_robots_touch_the_floor() {
     let (findings, model) = (findings.to_string(), read.expect("a model").0);
     assert_eq!(model.shapes.len(), 3);
     assert_eq!(model.contacts.len(), 16);
-    let ShapeKind::Hull { points } = &model.shapes[1].kind else { panic!("no hull") };
+    let ShapeKind::Hull { points, .. } = &model.shapes[1].kind else { panic!("no hull") };
     assert!(points.contains(&[0.1, -2.0 * 0.1, 3.0 * 0.1]), "{points:?}");
     for wanted in [
         "notice: 2 meshes are hulls for contacts",

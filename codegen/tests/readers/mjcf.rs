@@ -372,14 +372,14 @@ fn meshes_touch_the_floor() {
     let (m, findings) = load("robots/m.xml", &text, &ImportOptions { floor, ..ImportOptions::default() });
     let m = m.expect(&findings);
     let hulls = m.shapes.iter().filter_map(|shape| match &shape.kind {
-        ShapeKind::Hull { points } => Some((shape.name.as_str(), points.len())),
+        ShapeKind::Hull { points, .. } => Some((shape.name.as_str(), points.len())),
         _ => None,
     });
     let hulls: Vec<_> = hulls.collect();
     assert_eq!(hulls, [("first", 4), ("a", 4), ("a_shape_2", 4), ("a_shape_3", 8)]);
     assert_eq!(m.contacts.len(), 4 + 4 + 4 + 8);
     let first = m.shapes.iter().find(|shape| shape.name == "first").expect("a shape");
-    let ShapeKind::Hull { points } = &first.kind else { panic!("no hull") };
+    let ShapeKind::Hull { points, .. } = &first.kind else { panic!("no hull") };
     for corner in [[0.0, 0.0, -1.0], [1.0, 0.0, -1.0], [0.0, -2.0, -1.0], [0.0; 3]] {
         assert!(points.contains(&corner), "{points:?}");
     }

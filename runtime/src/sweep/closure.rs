@@ -98,6 +98,8 @@ impl<S: Copy> Closure<S> {
             | Closure::RollingBallOnCylinder { .. } => 3,
             #[cfg(feature = "height_fields")]
             Closure::RollingBallOnField { .. } => 3,
+            #[cfg(feature = "hulls")]
+            Closure::RollingBallOnHull { .. } => 3,
             Closure::PointOnLine => 2,
             Closure::Distance { .. }
             | Closure::PointOnPlane
@@ -119,6 +121,10 @@ impl<S: Copy> Closure<S> {
     pub fn rolls(&self) -> bool {
         #[cfg(feature = "height_fields")]
         if let Closure::RollingBallOnField { .. } = self {
+            return true;
+        }
+        #[cfg(feature = "hulls")]
+        if let Closure::RollingBallOnHull { .. } = self {
             return true;
         }
         use Closure::{
@@ -264,6 +270,10 @@ impl<S: Scalar> Closure<S> {
             Closure::RollingCapsules { lengths, radii } => Some(Touch::capsules(at, lengths, radii)),
             Closure::RollingBallOnBox { size, rounding, radius } => {
                 Some(Touch::ball_on_box(at, size, &[*rounding, *radius]))
+            }
+            #[cfg(feature = "hulls")]
+            Closure::RollingBallOnHull { hull, rounding, radius } => {
+                Some(Touch::ball_on_hull(at, hull, &[*rounding, *radius]))
             }
             Closure::RollingBallOnCylinder { length, radii } => Some(Touch::ball_on_cylinder(at, *length, radii)),
             #[cfg(feature = "height_fields")]

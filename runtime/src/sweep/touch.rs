@@ -6,6 +6,8 @@
 
 #[cfg(feature = "height_fields")]
 use crate::field::{Ball, Field, Foot, Ground};
+#[cfg(feature = "hulls")]
+use crate::hull::{Plane, Polyhedron};
 use crate::spatial::{add3, dot3, scale3, Vec3};
 use crate::workspace::Relative;
 use crate::Scalar;
@@ -81,6 +83,41 @@ impl<S: Scalar> Touch<S> {
         Touch::ball_on_faces(&faces, radii)
     }
 
+    /// A ball about the origin of `B` on a polyhedron in the axes of `A`; `radii` by which this is larger on all sides, with
+    /// rounded edges and corners, and of the ball. As on a box, the distance inside is that of the nearest face.
+    #[cfg(feature = "hulls")]
+    pub fn ball_on_hull(at: &Relative<S>, hull: &Polyhedron, radii: &[S; 2]) -> Touch<S> {
+        let place = core::array::from_fn(|k| dot3(at.axis(k), at.d));
+        let (mut way, mut square) = ([S::zero(); 3], S::zero());
+        // The nearest place of all edges, to whose ends corners belong.
+        for (k, edge) in hull.edges.iter().enumerate() {
+            let (from, axis) = (add3(place, edge.middle.map(|x| S::constant(-x))), edge.axis.map(S::constant));
+            let on = clamp(dot3(axis, from), S::constant(0.5 * edge.length));
+            let other = add3(from, scale3(-on, axis));
+            let size = dot3(other, other);
+            let nearer = if k == 0 { S::one() } else { above(square - size) };
+            way = either(nearer, other, way);
+            square = nearer * size + (S::one() - nearer) * square;
+        }
+        let (mut inside, mut nearest, mut largest) = (S::one(), [S::zero(); 3], S::zero());
+        for (k, face) in hull.faces.iter().enumerate() {
+            let (before, normal) = (before(&face.plane, place), face.plane.normal.map(S::constant));
+            inside = inside * (S::one() - above(before));
+            let nearer = if k == 0 { S::one() } else { above(before - largest) };
+            nearest = either(nearer, normal, nearest);
+            largest = nearer * before + (S::one() - nearer) * largest;
+            // A place before a face and not beyond one of its sides is nearest to the face.
+            let beyond = |at: S, side: &Plane| at * (S::one() - above(self::before(side, place)));
+            let on = face.sides.iter().fold(above(before), beyond);
+            way = either(on, scale3(before, normal), way);
+        }
+        let way = either(inside, nearest, way);
+        let length = (dot3(way, way) + S::constant(1e-36)).sqrt();
+        let normal = at.turned(scale3(S::one() / length, way));
+        let distance = (S::one() - inside) * length + inside * largest;
+        Touch { gap: distance - (radii[0] + radii[1]), normal, at: scale3(-radii[1], normal) }
+    }
+
     /// A ball about the origin of `B` on a cylinder about that of `A` and its z; `radii` of the cylinder and the ball.
     pub fn ball_on_cylinder(at: &Relative<S>, length: S, radii: &[S; 2]) -> Touch<S> {
         let across = at.across();
@@ -137,6 +174,18 @@ impl<S: Scalar> Touch<S> {
         let distance = (S::one() - inside) * length + inside * largest;
         Touch { gap: distance - (radii[0] + radii[1]), normal, at: scale3(-radii[1], normal) }
     }
+}
+
+/// How far a place is before a plane.
+#[cfg(feature = "hulls")]
+fn before<S: Scalar>(plane: &Plane, place: Vec3<S>) -> S {
+    dot3(plane.normal.map(S::constant), place) - S::constant(plane.height)
+}
+
+/// The first of two vectors where `first` is 1, the second where it is 0.
+#[cfg(feature = "hulls")]
+fn either<S: Scalar>(first: S, a: Vec3<S>, b: Vec3<S>) -> Vec3<S> {
+    add3(scale3(first, a), scale3(S::one() - first, b))
 }
 
 /// The nearer of two faces that are `length` apart, across `axis` and on either side of the first origin: how far before

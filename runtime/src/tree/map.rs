@@ -148,6 +148,10 @@ impl<S: Copy> Closure<S> {
             Closure::RollingBallOnBox { size, rounding, radius } => {
                 Closure::RollingBallOnBox { size: size.map(&mut of), rounding: of(rounding), radius: of(radius) }
             }
+            #[cfg(feature = "hulls")]
+            Closure::RollingBallOnHull { hull, rounding, radius } => {
+                Closure::RollingBallOnHull { hull, rounding: of(rounding), radius: of(radius) }
+            }
             Closure::RollingBallOnCylinder { length, radii } => {
                 Closure::RollingBallOnCylinder { length: of(length), radii: radii.map(of) }
             }

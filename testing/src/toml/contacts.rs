@@ -33,7 +33,8 @@ impl Writer<'_> {
                     line(out, "spacing", format!("{:?}", field.spacing));
                     line(out, "heights", format!("{heights:?}"));
                 }
-                ShapeKind::Hull { points } => {
+                ShapeKind::Hull { points, rounding } => {
+                    line(out, "rounding", format!("{rounding:?}"));
                     line(out, "points", format!("{points:?}"));
                     line(out, "most", format!("{}", points.len().max(4)));
                 }

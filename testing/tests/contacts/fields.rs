@@ -272,11 +272,7 @@ fn a_ball_lies_in_a_hollow() {
 }
 
 /// Coordinates and momenta a `time` after given coordinates and velocities, and the steps by what served them.
-pub(super) fn end<Y>(
-    mut mechanism: Y,
-    (mut q, v): (Vec<f64>, Vec<f64>),
-    time: f64,
-) -> (Vec<f64>, Vec<f64>, [u64; 5])
+pub(super) fn end<Y>(mut mechanism: Y, (mut q, v): (Vec<f64>, Vec<f64>), time: f64) -> (Vec<f64>, Vec<f64>, [u64; 5])
 where
     Y: Touching<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>> + Conjugate,
 {
