@@ -1,7 +1,7 @@
 //! Readers of file formats: text to [`raw::RawModel`]. Nothing outside this module knows the formats.
 
 mod floor;
-mod hull;
+pub(crate) mod hull;
 mod mesh;
 pub mod mjcf;
 pub mod raw;

@@ -151,9 +151,11 @@ fn property(table: &str, key: &str) -> String {
         (_, "damping" | "stiffness" | "rest" | "armature" | "start" | "start_velocity") => reference("freedoms"),
         (_, "ratios" | "radii" | "lengths" | "row") => reference("numbers"),
         (_, "offset") => reference("angle"),
-        (_, "mass" | "pitch" | "length" | "radius" | "decay" | "friction" | "restitution" | "limit_restitution") => {
-            reference("number")
-        }
+        (
+            _,
+            "mass" | "pitch" | "length" | "radius" | "rounding" | "decay" | "friction" | "restitution"
+            | "limit_restitution",
+        ) => reference("number"),
         (_, "max_velocity" | "max_effort") => reference("number"),
         // A test sees to it that there is none.
         _ => "{}".into(),
