@@ -37,7 +37,7 @@ pub(super) const MOST: usize = 2000;
 
 /// What a capsule, a box or a hull is: all that lies within a radius of its core, which is a line, a box or a polyhedron.
 pub(super) struct Rounded {
-    pub(super) radius: f64,
+    radius: f64,
     core: Core,
     corners: Vec<[f64; 3]>,
     edges: Vec<Edge>,
