@@ -6,10 +6,9 @@ Quadrupeds are dropped from random poses, without motors (`dropped`) or with spr
 (`standing`). Both programs have the numbers of one TOML model (`benches/contacts/mjcf.py`); masses, energies and a flight
 without contacts are compared before anything is timed. The error of a row is that of `benches/contacts`: the largest distance, over
 all bodies, between where their origins and centres of mass end and where they should, by this package's motion from event to
-event at a tolerance of 1e-12. Rows
-without such a motion are left out. What counts is the median of the others. Settings with which more than one row in twenty
-fails are shown, and have no part in the comparison. MuJoCo has the settings of `benches/contacts`, and the
-same with its own tolerance and number of iterations.
+event at a tolerance of 1e-12. Rows without such a motion are left out. What counts is the median of the others. Settings with
+which more than one row in twenty fails are shown, and have no part in the comparison. MuJoCo has the settings of
+`benches/contacts`, and the same with its own tolerance and number of iterations.
 
 Times are those of the processor, the least of some rounds; machine code is made in the first round, which does not count. The end
 of every row is all that is kept.
@@ -30,12 +29,12 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "benches" /
 import compare  # noqa: E402
 import mjcf  # noqa: E402
 
-ROWS = 64
+ROWS = 32
 # Model, and simulated time, s.
 SCENES = {"dropped": ("quadruped", 0.3), "standing": ("quadruped_hop", 1.0)}
 # Time steps, s, of both programs.
-STEPS = [1.6e-2, 8e-3, 4e-3, 2e-3, 1e-3, 5e-4, 2e-4]
-TOLERANCES = [1e-4, 1e-6, 1e-8]
+STEPS = [1.6e-2, 8e-3, 4e-3, 2e-3, 1e-3, 5e-4]
+TOLERANCES = [1e-4]
 REFERENCE = 1e-12
 # Errors, m, at which both programs are compared.
 ERRORS = [1e-1, 3e-2, 1e-2, 3e-3, 1e-3]

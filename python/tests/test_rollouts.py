@@ -165,7 +165,7 @@ def test_contacts_are_followed():
 
 
 def test_contacts_by_time_steps():
-    dog = multibody.load(MODELS / "contacts" / "quadruped.toml", search=False)
+    dog = multibody.load(MODELS / "contacts" / "quadruped.toml", wrenches=["trunk"], search=False)
     q, v = dog.start()
     q, v = np.stack([q, q, q]), np.stack([v, v, v])
     v[1, 0], v[2, 7] = 0.3, 1.0
@@ -181,7 +181,7 @@ def test_contacts_by_time_steps():
     again = dog.rollout((q, v), dt=1e-3, steps=200, contacts="steps", threads=3)
     alone = dog.rollout((q[1], v[1]), dt=1e-3, steps=200, contacts="steps")
     assert (again.q == motion.q).all() and (alone.q == motion.q[1]).all()
-    pulled = dog.rollout((q[1], v[1]), dt=1e-3, steps=200, contacts="steps", wrenches=np.ones((len(dog.body_names), 6)))
+    pulled = dog.rollout((q[1], v[1]), dt=1e-3, steps=200, contacts="steps", wrenches=np.ones((1, 6)))
     alone = dog.rollout((q[1], v[1]), dt=1e-3, steps=200, contacts="steps")
     assert (pulled.q != alone.q).any() and (alone.q == motion.q[1]).all()
     with pytest.raises(ValueError, match="leave `tolerance` out"):

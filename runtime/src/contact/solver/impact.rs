@@ -85,7 +85,7 @@ pub fn impact<S: Real>(
 }
 
 /// [`impact`] from impulses that solve a problem nearby: without restitution and all at once, steps of Newton's method begin
-/// there.
+/// there. One contact alone is solved exactly, wherever the search begins.
 ///
 /// # Errors
 /// As of [`impact`].
@@ -95,7 +95,7 @@ pub(in crate::contact) fn impact_near<S: Real>(
     impulses: &mut [S],
     work: &mut [S],
 ) -> Result<Impact<S>, ContactError> {
-    let known = impulses.iter().any(|p| *p != S::zero());
+    let known = problem.touches.len() > 1 && impulses.iter().any(|p| *p != S::zero());
     if !known || bounces(problem) || options.order == ImpactOrder::Sequential {
         return impact(problem, options, impulses, work);
     }
