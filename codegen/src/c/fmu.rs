@@ -13,6 +13,7 @@ use crate::options::{Options, Precision};
 use crate::output::Output;
 use crate::plan::Plan;
 use crate::search;
+use crate::symbolic::hash::fingerprint;
 
 /// The text files of a unit. Zipped, with a shared library under `binaries` if there is one, they are the `.fmu`.
 #[derive(Clone, Debug)]
@@ -54,7 +55,8 @@ pub fn fmu(model: &Model, options: &Options) -> Result<Fmu, GenerateError> {
     let (header, source) = files(&input, &identifier);
     let fields = fields(plan, &programs.sizes);
     let variables = variables(plan, &fields);
-    let guid = format!("{:016x}", fingerprint(&[&header, &source, &described(&identifier, "", &variables, plan)]));
+    let texts = [&header, &source, &described(&identifier, "", &variables, plan)];
+    let guid = format!("{:016x}", fingerprint(texts.into_iter().flat_map(|text| text.bytes())));
     let files = vec![
         ("modelDescription.xml".to_string(), described(&identifier, &guid, &variables, plan)),
         (format!("sources/{identifier}.c"), source),
@@ -194,10 +196,4 @@ fn wrapper(prefix: &Prefix, guid: &str, plan: &Plan, fields: &[Field]) -> String
     ]
     .iter()
     .fold(include_str!("fmi2.c").to_string(), |text, (word, by)| text.replace(&format!("@{word}@"), by))
-}
-
-/// A number that differs where texts do, by the method of Fowler, Noll and Vo: the same on every machine.
-fn fingerprint(texts: &[&str]) -> u64 {
-    let bytes = texts.iter().flat_map(|text| text.bytes());
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }

@@ -157,13 +157,11 @@ mod of_fields {
 
     use crate::model::ShapeKind;
     use crate::plan::Plan;
+    use crate::symbolic::hash::fingerprint;
 
     /// Name of a constant with a table, which is the same wherever the table is.
     pub fn table(table: &[f64]) -> String {
-        // The hash of Fowler, Noll and Vo of the bits.
-        let bytes = table.iter().flat_map(|x| x.to_bits().to_le_bytes());
-        let hash =
-            bytes.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3));
+        let hash = fingerprint(table.iter().flat_map(|x| x.to_bits().to_le_bytes()));
         format!("TABLE_{hash:016X}")
     }
 

@@ -8,6 +8,8 @@ use mbd_runtime::sweep::{Quantity, Trace};
 use mbd_runtime::Scalar;
 
 use super::hash::Words;
+#[cfg(feature = "height_fields")]
+use super::look_up::{LookUp, Table};
 
 /// An operand: the bits of a constant, or a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -73,49 +75,6 @@ pub struct FlooredReciprocal {
     pub minus_value: bool,
     /// Whether the negative of `floor` is the floor.
     pub minus_floor: bool,
-}
-
-/// An entry of a table; see [`Scalar::look_up`].
-#[cfg(feature = "height_fields")]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct LookUp {
-    /// The node whose value is the number of the entry.
-    pub at: u32,
-    /// Whether it is that of the negative of this value.
-    pub minus: bool,
-    /// The table.
-    pub table: Table,
-    /// What is added to the number.
-    pub offset: u32,
-}
-
-/// A table of numbers. Tables are equal where they are the same one.
-#[cfg(feature = "height_fields")]
-#[derive(Clone, Copy)]
-pub struct Table(pub &'static [f64]);
-
-#[cfg(feature = "height_fields")]
-impl PartialEq for Table {
-    fn eq(&self, other: &Table) -> bool {
-        std::ptr::eq(self.0, other.0)
-    }
-}
-
-#[cfg(feature = "height_fields")]
-impl Eq for Table {}
-
-#[cfg(feature = "height_fields")]
-impl std::hash::Hash for Table {
-    fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
-        state.write_usize(self.0.as_ptr() as usize);
-    }
-}
-
-#[cfg(feature = "height_fields")]
-impl std::fmt::Debug for Table {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "table of {} numbers", self.0.len())
-    }
 }
 
 impl Op {

@@ -1,7 +1,12 @@
 //! A hash function for operations: a product for each word. Operations are looked up for every operation that a sweep
-//! makes, and nobody chooses them to collide.
+//! makes, and nobody chooses them to collide. And one that is the same on every machine, for names.
 
 use std::hash::{BuildHasherDefault, Hasher};
+
+/// A number that differs where bytes do, by the method of Fowler, Noll and Vo: the same on every machine.
+pub fn fingerprint(bytes: impl Iterator<Item = u8>) -> u64 {
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
 
 /// Builder of [`WordHasher`].
 pub type Words = BuildHasherDefault<WordHasher>;

@@ -8,7 +8,9 @@ pub mod angles;
 mod cost;
 mod evaluate;
 mod expr;
-mod hash;
+pub(crate) mod hash;
+#[cfg(feature = "height_fields")]
+mod look_up;
 pub mod machine;
 pub mod passes;
 mod program;
@@ -16,6 +18,6 @@ mod program;
 pub use cost::{cost, Cost, BYTES};
 pub use expr::{Entry, Expr, FlooredReciprocal, Fma, Graph, Label, Name, Op, Operand};
 #[cfg(feature = "height_fields")]
-pub use expr::{LookUp, Table};
+pub use look_up::{LookUp, Table};
 pub use passes::Rewrite;
 pub use program::{Counts, Program, ProgramResult};

@@ -273,6 +273,12 @@ impl<Y: Touching> WithContacts<Y> {
         self.rubs(k) && !self.begins(k)
     }
 
+    /// Whether contact `k` slides against the direction of slip that is noted for it, after [`WithContacts::look`].
+    pub(super) fn is_turned(&self, k: usize) -> bool {
+        let ([x, y], [a, b]) = (self.tangential(k), self.slip_of(k));
+        self.slides_on(k) && x * a + y * b < Y::Scalar::zero()
+    }
+
     /// Direction of slip of contact `k` after [`WithContacts::look`]. Beyond the end of the motion along the direction
     /// where the step began, it is the mirror image: it does not jump within a step that leads too far.
     pub(super) fn direction(&self, k: usize) -> [Y::Scalar; 2] {

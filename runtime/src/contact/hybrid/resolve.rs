@@ -18,6 +18,9 @@ const LONGEST: f64 = 1e-4;
 /// Part of the momenta above which what they are off is taken for multipliers, not for rounding.
 const COLLECTED: f64 = 1e-6;
 
+/// How often modes are selected again at an event because holding the contacts has turned the slip of one round.
+const ROUNDS: u32 = 3;
+
 /// Speed of approach, m/s (rad/s), below which there is no impact.
 pub(super) const APPROACH: f64 = 1e-10;
 
@@ -101,6 +104,15 @@ where
         self.select(system, t)?;
         copy(self.before.as_mut(), system.modes());
         self.take_modes(system, t);
+        // Each round takes energy; the directions of the last one are noticed by the next step, if they are still wrong.
+        for _ in 0..ROUNDS {
+            system.look(t, &self.q, &self.p);
+            if !(0..self.count(system)).any(|k| system.is_turned(k)) {
+                break;
+            }
+            self.select(system, t)?;
+            self.take_modes(system, t);
+        }
         let changed = self.before.as_ref().iter().zip(system.modes()).filter(|(old, new)| old != new);
         self.statistics.switches += changed.count() as u64;
         if !self.p.as_ref().iter().chain(self.q.as_ref()).all(|x| x.is_finite()) {

@@ -289,6 +289,10 @@ where
             start = match self.positive(system, k, (from, end.0), value) {
                 Some(start) => start,
                 None if mode == Mode::Open => return self.sinks(system, k, (from, at_a), end),
+                // Friction would act along the slip: the direction is taken anew.
+                None if which == 1 && at_a < zero && system.slides_on(k) => {
+                    return Some(Found { contact: k, cause, theta: from });
+                }
                 None => return None,
             };
         }
