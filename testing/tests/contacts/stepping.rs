@@ -9,8 +9,8 @@ use mbd_runtime::constrained::WithPostStep;
 use mbd_runtime::constrained::{Effort, Projection, Stabilisation};
 use mbd_runtime::contact::{
     ByRules, ContactError, ContactMotion, ContactObserver, Effort as ContactEffort, FixedSweeps, HybridError, Regime,
-    RegimeChange, RegimeChoice, RegimeReason, RegimeRules, StepImpulses, SteppingStatistics, TimeStepping,
-    Touching, WithContacts,
+    RegimeChange, RegimeChoice, RegimeReason, RegimeRules, StepImpulses, SteppingStatistics, TimeStepping, Touching,
+    WithContacts,
 };
 use mbd_runtime::integrate::{Step, Tolerances};
 use mbd_runtime::{Conjugate, Energetic, System as _};
