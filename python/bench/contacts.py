@@ -37,7 +37,7 @@ STEPS = [1.6e-2, 8e-3, 4e-3, 2e-3, 1e-3, 5e-4]
 TOLERANCES = [1e-4]
 REFERENCE = 1e-12
 # Errors, m, at which both programs are compared.
-ERRORS = [1e-1, 3e-2, 1e-2, 3e-3, 1e-3]
+ERRORS = [1e-1, 8e-2, 6e-2, 3e-2, 1e-2, 3e-3, 1e-3, 1e-4]
 # How far the lowest foot is from the ground at the start, m; how far the trunk leans, rad; how far joints are turned, rad;
 # velocities, m/s and rad/s.
 HEIGHT, LEAN, TURN, SPEED = (0.02, 0.1), 0.3, 0.2, 0.3

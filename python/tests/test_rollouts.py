@@ -171,13 +171,15 @@ def test_contacts_by_time_steps():
     v[1, 0], v[2, 7] = 0.3, 1.0
     wanted = dog.rollout((q, v), dt=0.2, steps=1, tolerance=1e-8).q[:, -1]
     errors = []
-    for dt in (4e-3, 2e-3, 1e-3):
+    for dt in (4e-3, 1e-3, 1e-4):
         steps = round(0.2 / dt)
         motion = dog.rollout((q, v), dt=dt, steps=steps, contacts="steps", threads=1, forces=True)
         errors.append(abs(motion.q[:, -1] - wanted).max())
         assert np.isnan(motion.forces).all()
-    assert errors[0] < 0.1 and errors[2] < 0.5 * errors[0]
+    # Of the first order, irregularly: steps meet a landing sooner or later. Feet move by centimetres in a long step.
+    assert max(errors) < 0.05 and errors[2] < 0.25 * errors[0]
     # Neither threads, nor other rows, nor calls before have an influence.
+    motion = dog.rollout((q, v), dt=1e-3, steps=200, contacts="steps", threads=1)
     again = dog.rollout((q, v), dt=1e-3, steps=200, contacts="steps", threads=3)
     alone = dog.rollout((q[1], v[1]), dt=1e-3, steps=200, contacts="steps")
     assert (again.q == motion.q).all() and (alone.q == motion.q[1]).all()

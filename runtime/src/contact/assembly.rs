@@ -103,7 +103,7 @@ impl<S: Real> ColumnsOf<'_, '_, S> {
         }
         let along = |row: usize| along_entries(self.rows, self.places, entries, row, v);
         let count = lines(self.contacts, *of).count();
-        for (other, a) in lines(self.contacts, *of).zip(a.iter_mut().skip(i).step_by(count)) {
+        for (other, a) in lines(self.contacts, *of).zip(a.iter_mut().skip(i).step_by(count.max(1))) {
             *a = along(other.row);
         }
         if let (Some(own), Some(line)) = (own.get_mut(i), lines(self.contacts, *of).nth(i)) {
