@@ -15,7 +15,7 @@ use multibody::runtime::contact::{
     ContactEvent, ContactMotion, ContactObserver, ContactStatistics, HybridError, Mode, ModeTable, Regime,
     RegimeChange, RegimeChoice, RegimeReason, RegimeStatistics, SteppingStatistics, Stretch, WithContacts,
 };
-use multibody::runtime::integrate::Statistics;
+use multibody::runtime::integrate::{AutoSwitch, Radau5, Statistics, Step};
 use multibody::runtime::Conjugate;
 
 use super::control::{Driven, Loads};
@@ -136,14 +136,25 @@ impl ContactObserver<Mechanism> for Observer {
 
 /// The method of the settings around which contacts are followed.
 fn method(settings: &Settings, system: &System) -> Outcome<BoxedMethod<'static, System>> {
-    let Some(method) = catalogue::explicit(settings.method, system, false) else {
-        let names: Vec<&str> = catalogue::EXPLICIT.iter().map(|entry| entry.name).collect();
-        return Err(Failure::new(
-            format!("--method {}: a motion with contacts takes explicit methods only", settings.method),
-            format!("take one of {}", names.join(", ")),
-        ));
-    };
-    Ok(Box::new(WithPostStep::new(system, method, projection(settings, system))))
+    let close = || projection(settings, system);
+    match (catalogue::explicit(settings.method, system, false), settings.step) {
+        // What slides slowly is stiff.
+        (Some(method), Step::Adaptive(_)) => {
+            let method = AutoSwitch::new(system, method, Radau5::new(system));
+            Ok(Box::new(WithPostStep::new(system, method, close())))
+        }
+        (Some(method), Step::Fixed(_)) => Ok(Box::new(WithPostStep::new(system, method, close()))),
+        (None, _) => {
+            let names = || catalogue::entries().map(|entry| entry.name).collect::<Vec<_>>().join(", ");
+            let method = catalogue::implicit(settings.method, system, false).ok_or_else(|| {
+                Failure::new(
+                    format!("--method {}: no such method", settings.method),
+                    format!("take one of {}", names()),
+                )
+            })?;
+            Ok(Box::new(WithPostStep::new(system, method, close())))
+        }
+    }
 }
 
 /// What closes loops and contacts.

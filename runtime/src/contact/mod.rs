@@ -5,6 +5,7 @@
 //! tangential rows follow.
 
 mod assembly;
+mod derivatives;
 mod hybrid;
 mod instant;
 #[cfg(feature = "alloc")]

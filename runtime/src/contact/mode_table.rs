@@ -7,7 +7,9 @@ use core::ops::{Deref, DerefMut};
 use super::assembly::{Columns, ColumnsOf};
 use super::{rows_that_act, Contact, Mode, Reach, Touching, Way};
 use crate::interp::Interpreter;
-use crate::system::{system_within, Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
+use crate::system::{
+    system_within, Conjugate, Constrained, Differentiable, Energetic, LieJoint, Real, Row, StateDerivatives, System,
+};
 use crate::Scalar;
 
 /// A mechanism whose rows can be taken out of its equations.
@@ -139,6 +141,28 @@ impl<Y: Reducible> System for ModeTable<Y> {
         pd: &mut Y::Momenta,
     ) {
         (**self).rates_at(t, q, p, qd, pd);
+    }
+}
+
+impl<Y: Reducible + Differentiable> Differentiable for ModeTable<Y> {
+    type Square = Y::Square;
+
+    fn square(&self) -> Y::Square {
+        self.full.square()
+    }
+
+    fn depends_on_time(&self) -> bool {
+        (**self).depends_on_time()
+    }
+
+    fn rate_derivatives(
+        &mut self,
+        t: Y::Scalar,
+        q: &Y::Coordinates,
+        p: &Y::Momenta,
+        out: &mut StateDerivatives<Y::Momenta, Y::Square>,
+    ) {
+        (**self).rate_derivatives(t, q, p, out);
     }
 }
 

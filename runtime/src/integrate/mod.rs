@@ -26,6 +26,7 @@
 //! [`StepError::NoConvergence`]. [`Statistics::factorisations`] counts those of one step as one.
 
 mod adams;
+mod auto_switch;
 pub mod chart;
 mod collocation;
 mod combine;
@@ -61,6 +62,7 @@ pub mod tableau;
 pub use crate::constant::{decimal, ratio, Constant};
 pub use crate::error::StepError;
 pub use adams::{Ab4, Ab6, Abm4, Abm6, Abm8, Adams, AdamsBashforth, AdamsMoulton, AdamsOfVariableOrder, VariableAdams};
+pub use auto_switch::AutoSwitch;
 pub use chart::{Chart, Point};
 pub use collocation::{Collocation, Formula};
 pub use control::{Control, Limits, Step, Tolerance, Tolerances};

@@ -12,4 +12,5 @@ mod saltation;
 mod scene;
 mod solid;
 mod stepping;
+mod stiff;
 mod walker;

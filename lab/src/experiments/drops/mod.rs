@@ -13,7 +13,7 @@ use multibody::runtime::contact::{
     ContactError, ContactMotion, ContactObserver, HybridError, ModeTable, Regime, RegimeChoice, RegimeRules, Stretch,
     Touching, WithContacts,
 };
-use multibody::runtime::integrate::{Step, Tolerances, Verner9};
+use multibody::runtime::integrate::{AutoSwitch, Radau5, Step, Tolerances, Verner9};
 use multibody::runtime::{Conjugate, Constrained, Energetic, System as _};
 
 use super::tables::{head, row};
@@ -28,7 +28,7 @@ const MECHANISMS: [(&str, &str); 2] = [("box", include_str!("box.toml")), ("leg"
 /// Tolerance of the motion.
 const TOLERANCE: f64 = 1e-8;
 /// Steps of a motion by events, at most; with time steps in between, ten times as many.
-const STEPS: u64 = 3_000;
+const STEPS: u64 = 10_000;
 /// Time steps where events are not followed, s.
 const STEP: f64 = 1e-3;
 /// Time of a throw, s.
@@ -230,7 +230,8 @@ fn follow(
 ) -> Result<(), HybridError> {
     let effort = Effort { energy: f64::INFINITY, ..Effort::default() };
     let projection = |system: &System| Projection::new(system, Stabilisation::Mass, effort);
-    let method = WithPostStep::new(system, Verner9::new(system), projection(system));
+    let method = AutoSwitch::new(system, Verner9::new(system), Radau5::new(system));
+    let method = WithPostStep::new(system, method, projection(system));
     let step = Step::Adaptive(Tolerances::new(TOLERANCE));
     let close = projection(system);
     let rules = RegimeRules::new(choice, STEP);
