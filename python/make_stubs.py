@@ -173,6 +173,7 @@ class Model:
         drive_v: Optional[ArrayLike] = ...,
         events: Union[bool, Sequence[Union[Event, _EventFunction]], None] = ...,
         forces: bool = ...,
+        contacts: Literal["automatic", "events", "steps"] = ...,
         threads: Optional[int] = ...,
         out: Optional[Tuple[_Array, _Array]] = ...,
         on_error: Literal["raise", "mark"] = ...,

@@ -144,6 +144,7 @@ def rollout(
     drive_v: Any = None,
     events: Any = None,
     forces: bool = False,
+    contacts: str = "automatic",
     threads: Optional[int] = None,
     out: Any = None,
     on_error: str = "raise",
@@ -168,6 +169,9 @@ def rollout(
         ``events``: functions ``f(t, q, v)`` whose zeros are looked for, or `Event` with a direction and whether the row ends;
             states are in the layout of ``x0``. ``True`` asks for the events of contacts.
         ``forces``: whether the forces of contacts are told, N along the normal and two tangents (N m for stops of rotations).
+        ``contacts``: how contacts are followed: ``"events"``, from event to event; ``"steps"``, by time steps of ``dt`` with the
+            impulses of all contacts at once, whose error is of the first order in ``dt``; or ``"automatic"``, by events, and
+            by time steps of 1 ms or less where these crowd or fail.
         ``threads``: number of threads, all cores without; the results are the same bits for any number.
         ``out``: a pair of arrays for ``q`` and ``v``.
         ``on_error``: ``"raise"`` the failure of the first row that fails, or ``"mark"``: rows are NaN from where they failed.
@@ -214,6 +218,7 @@ def rollout(
         "tolerance": None if tolerance is None else float(tolerance),
         "momenta": state == "momenta",
         "layout": layout,
+        "contacts": contacts,
         "threads": threads,
     }
     motion = Rollout(*self._rollout(start, u, settings, _asked(events, forces), _given(self, inputs), drives, out))

@@ -35,8 +35,9 @@ pub const METHODS: [&str; 2] = ["rk4", "dop853"];
 pub struct Touching {
     full: Compiled,
     contacts: Vec<Contact<f64>>,
-    /// With the parameters at their defaults, and the sets of modes that were visited so far.
-    table: ModeTable<Compiled>,
+    /// With the parameters at their defaults, and the sets of modes that were visited so far; it is away while a row is
+    /// computed.
+    table: Option<ModeTable<Compiled>>,
 }
 
 impl Touching {
@@ -47,9 +48,22 @@ impl Touching {
         let mut full = full.compiled_after(Compiled::<f64>::WORTHWHILE);
         full.inputs().gravity = gravity;
         let contacts = plan.contacts();
-        let mut table = ModeTable::new(full.clone(), contacts.clone());
-        table.inputs().gravity = gravity;
-        Ok(Touching { full, contacts, table })
+        Ok(Touching { full, contacts, table: None })
+    }
+
+    /// The sets of modes that are visited; each begins with the rows in the order of the plan.
+    fn take(&mut self) -> ModeTable<Compiled> {
+        let new = || ModeTable::new(self.full.clone(), self.contacts.clone());
+        let mut table = self.table.take().unwrap_or_else(new);
+        table.evaluators_mut().for_each(Compiled::restore_row_order);
+        table
+    }
+
+    /// Gives these of the fields their defaults again, after a call that has set them.
+    pub fn reset(&mut self, fields: impl Iterator<Item = usize>, defaults: &[Vec<f64>]) {
+        let Some(table) = &mut self.table else { return };
+        fields.for_each(|field| set(table, field, &defaults[field]));
+        table.inputs().tau.fill(0.0);
     }
 }
 
@@ -72,15 +86,15 @@ fn params() -> Option<usize> {
 }
 
 impl Motion<'_> {
-    fn has_params(&self) -> bool {
+    pub fn has_params(&self) -> bool {
         self.fields.iter().any(|(field, _)| Some(*field) == params())
     }
 
     /// The mechanism with the inputs of row `k`.
-    fn table(&self, touching: &Touching, k: usize) -> ModeTable<Compiled> {
+    fn table(&self, touching: &mut Touching, k: usize) -> ModeTable<Compiled> {
         let (own, others): (Vec<_>, Vec<_>) = self.fields.iter().partition(|(field, _)| Some(*field) == params());
         let mut table = match own.first() {
-            None => touching.table.clone(),
+            None => touching.take(),
             Some((field, rows)) => {
                 let mut full = touching.full.clone();
                 set(&mut full, *field, rows.row(k));
@@ -114,7 +128,11 @@ impl Motion<'_> {
     ) -> Result<(), Failed> {
         let mut kept = Kept { events: self.asked.contacts.then(Vec::new), forces: self.asked.forces.then(Vec::new) };
         let row = item.0;
-        let done = self.follow(machine, touching, item, written, &mut kept, beat);
+        let mut system = WithContacts::new(self.table(touching, row));
+        let done = self.follow(machine, &mut system, item, written, &mut kept, beat);
+        if !self.has_params() {
+            touching.table = Some(system.into_system());
+        }
         self.told.events(row, kept.events.unwrap_or_default());
         if let Some(forces) = kept.forces {
             self.told.forces(row, forces);
@@ -125,20 +143,20 @@ impl Motion<'_> {
     fn follow(
         &self,
         machine: &mut Compiled,
-        touching: &mut Touching,
+        system: &mut System,
         (k, q, v): &mut Item,
         written: &mut usize,
         kept: &mut Kept,
         beat: &mut Beat,
     ) -> Result<(), Failed> {
         let mut state = self.begin(machine, *k)?;
-        let mut system = WithContacts::new(self.table(touching, *k));
-        let (method, close, step) = method(self.settings, &system);
-        let rules = RegimeRules::new(RegimeChoice::Automatic, self.settings.dt.min(LONGEST));
+        let (method, close, step) = method(self.settings, system);
+        let length = if self.regime == RegimeChoice::TimeSteps { f64::INFINITY } else { LONGEST };
+        let rules = RegimeRules::new(self.regime, self.settings.dt.min(length));
         if self.settings.steps > 0 {
-            self.drive(*k, 0, &state.q, &mut system);
+            self.drive(*k, 0, &state.q, system);
         }
-        let motion = ContactMotion::new(&mut system, (method, step), close, rules, 0.0, (&state.q, &state.p));
+        let motion = ContactMotion::new(system, (method, step), close, rules, 0.0, (&state.q, &state.p));
         let mut motion = motion.map_err(|error| failed(&error))?;
         let (nq, nv) = self.sizes;
         for step in 0..=self.settings.steps {
@@ -146,7 +164,7 @@ impl Motion<'_> {
             if step.is_multiple_of(self.settings.every) {
                 let at = *written;
                 let (q, v) = (&mut q[at * nq..(at + 1) * nq], &mut v[at * nv..(at + 1) * nv]);
-                kept.forces(&system, motion.regime(), t, &state);
+                kept.forces(system, motion.regime(), t, &state);
                 self.store(system.system_mut(), t, &mut state, q, v);
                 *written += 1;
             }
@@ -154,8 +172,8 @@ impl Motion<'_> {
                 break;
             }
             if step > 0 && self.u.is_some() {
-                self.drive(*k, step, &state.q, &mut system);
-                motion.resume(&mut system).map_err(|error| failed(&error))?;
+                self.drive(*k, step, &state.q, system);
+                motion.resume(system).map_err(|error| failed(&error))?;
             }
             let (end, mut left) = ((step + 1) as f64 * self.settings.dt, MOST_STEPS);
             while motion.time() < end {
@@ -164,15 +182,12 @@ impl Motion<'_> {
                     return Err(failed(&error.into()));
                 }
                 left -= 1;
-                motion.advance(&mut system, end, kept).map_err(|error| failed(&error))?;
+                motion.advance(system, end, kept).map_err(|error| failed(&error))?;
                 if !beat.goes_on() {
                     return Ok(());
                 }
             }
-            motion.state(&system, &mut state.q, &mut state.p);
-        }
-        if !self.has_params() {
-            touching.table = system.system().clone();
+            motion.state(system, &mut state.q, &mut state.p);
         }
         Ok(())
     }

@@ -25,8 +25,9 @@ pub struct Machines {
     defaults: Vec<Vec<f64>>,
     pool: Mutex<Vec<Compiled>>,
     options: Options,
-    /// With its contacts, made when they are first followed.
+    /// With its contacts, made when they are first followed, and those that calls have given back.
     touching: OnceLock<Result<Touching, CompileError>>,
+    kept: Mutex<Vec<Touching>>,
     /// A bit for each output whose code is there.
     prepared: AtomicU64,
 }
@@ -57,6 +58,7 @@ impl Machines {
             pool: Mutex::default(),
             options: options.clone(),
             touching: OnceLock::new(),
+            kept: Mutex::default(),
             prepared: AtomicU64::new(0),
         })
     }
@@ -87,8 +89,21 @@ impl Machines {
         AnyLanes::new(&self.template, most)
     }
 
+    /// What is given where a call gives nothing, of each of [`FIELDS`].
+    pub fn defaults(&self) -> &[Vec<f64>] {
+        &self.defaults
+    }
+
+    /// Keeps a mechanism with contacts for later: with the sets of modes that it has visited.
+    pub fn keep(&self, touching: Touching) {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).push(touching);
+    }
+
     /// The mechanism with its contacts, for rollouts.
     pub fn touching(&self) -> Result<Touching, CompileError> {
+        if let Some(kept) = self.kept.lock().unwrap_or_else(PoisonError::into_inner).pop() {
+            return Ok(kept);
+        }
         let gravity = self.template.clone().inputs().gravity;
         let make = || Touching::new(self.template.plan(), &self.options, gravity);
         self.touching.get_or_init(make).clone()

@@ -4,6 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use multibody::codegen::jit::Compiled;
 use multibody::codegen::output::Output;
+use multibody::runtime::contact::RegimeChoice;
 use multibody::runtime::integrate::StepError;
 use multibody::runtime::layout::Layout;
 use multibody::runtime::{Conjugate, Constrained, System};
@@ -67,10 +68,10 @@ pub fn rollout<'py>(
     for output in [Output::Rates, Output::Velocities, Output::Momenta] {
         machines.prepare(py, output).map_err(|e| compile_error(py, &e))?;
     }
-    let touching = match touches {
-        true => Some(py.detach(|| machines.touching()).map_err(|e| compile_error(py, &e))?),
-        false => None,
-    };
+    let regime = settings.regime(touches)?;
+    if touches {
+        py.detach(|| machines.touching().map(|made| machines.keep(made))).map_err(|e| compile_error(py, &e))?;
+    }
     let dims = model.plan.dims;
     let (nq, nv) = layout.as_ref().map_or((dims.nq, dims.nv), Layout::sizes);
     let second = if settings.momenta { "p0" } else { "v0" };
@@ -99,7 +100,8 @@ pub fn rollout<'py>(
             u: u.as_ref().map(Given::rows).transpose()?,
             fields,
             moving: moving.as_ref().map(|m| Ok::<_, PyErr>((m.q.rows()?, m.v.rows()?))).transpose()?,
-            touching,
+            touches,
+            regime,
             asked: &asked,
             told: &told,
         };
@@ -127,8 +129,9 @@ pub struct Motion<'a> {
     pub fields: Vec<(usize, Rows<'a>)>,
     /// Positions and rates of prescribed joints that move.
     moving: Option<(Rows<'a>, Rows<'a>)>,
-    /// For models with contacts.
-    touching: Option<Touching>,
+    /// Whether the model has contacts, and how they are followed.
+    touches: bool,
+    pub regime: RegimeChoice,
     pub asked: &'a Asked,
     pub told: &'a Told,
 }
@@ -174,9 +177,17 @@ impl Motion<'_> {
                 let block: Vec<Item> = items.by_ref().take(width).collect();
                 (!block.is_empty()).then_some(block)
             });
-            let begin = || Memory { machine: machines.take(), lanes: lanes.clone(), touching: self.touching.clone() };
+            let begin = || {
+                let touching = if self.touches { machines.touching().ok() } else { None };
+                Memory { machine: machines.take(), lanes: lanes.clone(), touching }
+            };
+            let fields = || self.fields.iter().map(|(field, _)| *field);
             let end = |memory: Memory| {
-                machines.give_back(memory.machine, self.fields.iter().map(|(field, _)| *field));
+                machines.give_back(memory.machine, fields());
+                if let Some(mut touching) = memory.touching {
+                    touching.reset(fields(), machines.defaults());
+                    machines.keep(touching);
+                }
             };
             on_threads(blocks, threads, begin, end, |memory, block: Vec<Item>, beat| {
                 for (k, failed) in self.block(memory, block, beat) {
@@ -192,7 +203,7 @@ impl Motion<'_> {
     /// Whether rows can be computed several at once.
     fn at_once(&self, machines: &Machines, rows: usize) -> bool {
         let Settings { method, tolerance, .. } = self.settings;
-        let alone = self.touching.is_some() || self.moving.is_some() || !self.asked.functions.is_empty();
+        let alone = self.touches || self.moving.is_some() || !self.asked.functions.is_empty();
         rows > 1 && !alone && machines.sizes().rows == 0 && lanes::possible(method, *tolerance)
     }
 

@@ -2,11 +2,16 @@
 
 use multibody::codegen::plan::state_layout;
 use multibody::runtime::catalogue;
+use multibody::runtime::contact::RegimeChoice;
 use multibody::runtime::layout::Layout;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::model::Model;
+
+/// The ways to follow contacts: events where they can be resolved and time steps elsewhere, events alone, time steps alone.
+const REGIMES: [(&str, RegimeChoice); 3] =
+    [("automatic", RegimeChoice::Automatic), ("events", RegimeChoice::Events), ("steps", RegimeChoice::TimeSteps)];
 
 /// How motions are computed; a dictionary of Python.
 #[derive(FromPyObject)]
@@ -19,6 +24,7 @@ pub struct Settings {
     pub tolerance: Option<f64>,
     pub momenta: bool,
     layout: String,
+    contacts: String,
     pub threads: Option<usize>,
 }
 
@@ -50,6 +56,28 @@ impl Settings {
             }
             _ => Ok(()),
         }
+    }
+
+    /// How contacts are followed: one of [`REGIMES`].
+    ///
+    /// # Errors
+    /// Another word; one for a model without contacts; time steps with a tolerance.
+    pub fn regime(&self, touches: bool) -> PyResult<RegimeChoice> {
+        let found = REGIMES.iter().find(|(name, _)| *name == self.contacts);
+        let words = match found {
+            None => {
+                let names: Vec<&str> = REGIMES.iter().map(|(name, _)| *name).collect();
+                format!("contacts are not followed by `{}`: take {}", self.contacts, names.join(", "))
+            }
+            Some((name, choice)) if !touches && *choice != RegimeChoice::Automatic => {
+                format!("the model has no contacts that `{name}` could follow")
+            }
+            Some((_, RegimeChoice::TimeSteps)) if self.tolerance.is_some() => {
+                "time steps have the length `dt`: leave `tolerance` out, or take contacts=\"events\"".into()
+            }
+            Some((_, choice)) => return Ok(*choice),
+        };
+        Err(PyValueError::new_err(words))
     }
 
     /// The layout of states and joint forces; `None` for that of this project.

@@ -164,6 +164,36 @@ def test_contacts_are_followed():
     assert [(failure.row, failure.kind) for failure in below.failures] == [(1, "overlap")]
 
 
+def test_contacts_by_time_steps():
+    dog = multibody.load(MODELS / "contacts" / "quadruped.toml", wrenches=["trunk"], search=False)
+    q, v = dog.start()
+    q, v = np.stack([q, q, q]), np.stack([v, v, v])
+    v[1, 0], v[2, 7] = 0.3, 1.0
+    wanted = dog.rollout((q, v), dt=0.2, steps=1, tolerance=1e-8).q[:, -1]
+    errors = []
+    for dt in (4e-3, 1e-3, 1e-4):
+        steps = round(0.2 / dt)
+        motion = dog.rollout((q, v), dt=dt, steps=steps, contacts="steps", threads=1, forces=True)
+        errors.append(abs(motion.q[:, -1] - wanted).max())
+        assert np.isnan(motion.forces).all()
+    # Of the first order, irregularly: steps meet a landing sooner or later. Feet move by centimetres in a long step.
+    assert max(errors) < 0.05 and errors[2] < 0.25 * errors[0]
+    # Neither threads, nor other rows, nor calls before have an influence.
+    motion = dog.rollout((q, v), dt=1e-3, steps=200, contacts="steps", threads=1)
+    again = dog.rollout((q, v), dt=1e-3, steps=200, contacts="steps", threads=3)
+    alone = dog.rollout((q[1], v[1]), dt=1e-3, steps=200, contacts="steps")
+    assert (again.q == motion.q).all() and (alone.q == motion.q[1]).all()
+    pulled = dog.rollout((q[1], v[1]), dt=1e-3, steps=200, contacts="steps", wrenches=np.ones((1, 6)))
+    alone = dog.rollout((q[1], v[1]), dt=1e-3, steps=200, contacts="steps")
+    assert (pulled.q != alone.q).any() and (alone.q == motion.q[1]).all()
+    with pytest.raises(ValueError, match="leave `tolerance` out"):
+        dog.rollout((q, v), dt=1e-3, steps=2, contacts="steps", tolerance=1e-6)
+    with pytest.raises(ValueError, match="contacts are not followed by `both`: take automatic, events, steps"):
+        dog.rollout((q, v), dt=1e-3, steps=2, contacts="both")
+    with pytest.raises(ValueError, match="no contacts that `steps` could follow"):
+        multibody.load(MODELS / "ur5.urdf", search=False).rollout((np.zeros(6), np.zeros(6)), dt=1e-3, steps=2, contacts="steps")
+
+
 def test_a_stop_holds_against_a_force():
     """A joint that is driven against its stop does not pass it."""
     arm = multibody.load(MODELS / "ur5.urdf", limits=True, gravity=(0, 0, 0), search=False)

@@ -4,7 +4,7 @@ use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
 
 use multibody::codegen::jit::Compiled;
-use multibody::runtime::contact::{Contact, Reach, Reducible, Way};
+use multibody::runtime::contact::{ColumnsOf, Contact, Reach, Reducible, Way};
 use multibody::runtime::system::{LieJoint, Part, Row};
 use multibody::runtime::{Conjugate, Constrained, Differentiable, Energetic, StateDerivatives, System};
 
@@ -200,5 +200,8 @@ impl Reducible for Driven {
         entries: &mut Vec<f64>,
     ) {
         self.inner.gaps(q, v, gaps, velocities, entries);
+    }
+    fn project_several(&mut self, t: f64, q: &Vec<f64>, of: &mut ColumnsOf<f64>) -> bool {
+        self.inner.project_several(t, q, of)
     }
 }

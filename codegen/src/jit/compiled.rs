@@ -1,19 +1,20 @@
 //! A mechanism whose functions are machine code made at run time.
 
-use std::sync::{Arc, OnceLock};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use mbd_runtime::contact::{Contact, Reach, Reducible, Way};
+use mbd_runtime::contact::{ColumnsOf, Contact, Reach, Reducible, Way};
 use mbd_runtime::tree::row_order::RowProducts;
 use mbd_runtime::Interpreter;
 
 use super::given::Given;
 use super::instructions::width;
-use super::lanes::AllLanes;
+use super::lanes::{AllLanes, Several};
 use super::memory::{MachineCode, Number};
 use super::{vectors, CompileError};
 use crate::code::{compile, Code};
 use crate::model::{Gravity, Model};
-use crate::options::Options;
+use crate::options::{Arithmetic, Options};
 use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
 use crate::rolled::{rolled, together, Together};
@@ -55,9 +56,11 @@ pub struct Compiled<S: Number = f64> {
     params: Vec<S>,
     /// 1 for each row that acts, 0 for one that does not, where that is an input.
     pub(super) acts: Vec<S>,
-    scratch: Vec<S>,
+    pub(super) scratch: Vec<S>,
     /// Arguments and results that have to be copied.
     pub(super) copies: Vec<S>,
+    /// Memory for several states at once.
+    pub(super) several: Several<S>,
     /// Motion of the prescribed joints, where it is a function of time.
     pub(super) drives: Option<Arc<dyn super::Drives<S>>>,
 }
@@ -71,6 +74,8 @@ pub(super) struct Shared<S> {
     /// One for each of [`Output::ALL`].
     outputs: Vec<OnceLock<Result<MachineCode<S>, CompileError>>>,
     coordinate_rates: OnceLock<Result<MachineCode<S>, CompileError>>,
+    /// The same with only some rows of the constraints, by the rows that act.
+    reduced: Mutex<BTreeMap<Vec<bool>, Arc<Shared<S>>>>,
     /// Code for several states at once.
     pub(super) lanes: AllLanes,
 }
@@ -79,7 +84,12 @@ impl<S: Number> Shared<S> {
     /// Nothing is compiled yet.
     fn new(plan: Plan, options: Options, sizes: Sizes) -> Self {
         let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
-        Shared { plan, options, sizes, outputs, coordinate_rates: OnceLock::new(), lanes: AllLanes::default() }
+        let (coordinate_rates, reduced, lanes) = (OnceLock::new(), Mutex::default(), AllLanes::default());
+        Shared { plan, options, sizes, outputs, coordinate_rates, reduced, lanes }
+    }
+
+    pub(super) fn sizes(&self) -> &Sizes {
+        &self.sizes
     }
 
     /// Compiles a program.
@@ -165,6 +175,7 @@ impl<S: Number> Compiled<S> {
             acts,
             scratch: Vec::new(),
             copies: Vec::new(),
+            several: Several::default(),
             drives: None,
         })
     }
@@ -272,10 +283,7 @@ impl<S: Number> Compiled<S> {
     /// it.
     #[inline]
     pub(super) fn run(&mut self, output: Output, arguments: [&[S]; 3], results: &mut [&mut [S]]) -> bool {
-        if self.interpreted {
-            return false;
-        }
-        if self.patience > 0 && !self.patient(output) {
+        if self.interprets(output) {
             return false;
         }
         let Ok(code) = self.shared.output(output) else { return false };
@@ -284,6 +292,19 @@ impl<S: Number> Compiled<S> {
         // Code for one state never gives up.
         code.call(&given, results, scratch);
         true
+    }
+
+    /// Whether the interpreter computes an output now; the call is counted. Code that another clone has had made is taken at
+    /// once, if it gives the same bits.
+    #[inline]
+    pub(super) fn interprets(&mut self, output: Output) -> bool {
+        if self.interpreted {
+            return true;
+        }
+        self.patience > 0 && !self.patient(output) && {
+            let made = || self.shared.outputs[output as usize].get().is_some();
+            !(self.shared.options.arithmetic == Arithmetic::Exact && made())
+        }
     }
 
     /// Counts a call of an output; whether it is to be compiled.
@@ -333,11 +354,11 @@ impl<S: Number> Compiled<S> {
     /// The mechanism in which only some rows of the constraints act, one entry of `acts` for each row: with the
     /// parameters and the gravity of this one, and other inputs that are zero.
     fn with_rows(&self, acts: &[bool]) -> Self {
-        let options = self.shared.options.clone();
-        let Shared { plan, sizes, .. } = &*self.shared;
-        let plan = plan.acting(acts);
+        let Shared { plan, options, sizes, reduced, .. } = &*self.shared;
+        let make = || Arc::new(Shared::new(plan.acting(acts), options.clone(), *sizes));
+        let mut reduced = reduced.lock().unwrap_or_else(PoisonError::into_inner);
+        let shared = reduced.entry(acts.to_vec()).or_insert_with(make).clone();
         let interpreter = self.interpreter.acting(acts);
-        let shared = Arc::new(Shared::new(plan, options, *sizes));
         Compiled { shared, planned: None, interpreter, calls: vec![0; self.calls.len()], ..self.clone() }
     }
 
@@ -366,7 +387,9 @@ impl<S: Number> Reducible for Compiled<S> {
     }
 
     fn way(&self) -> Way {
-        let compiled = !self.interpreted && self.calls.get(Output::Rates as usize).is_none_or(|n| *n >= self.patience);
+        let exact = self.shared.options.arithmetic == Arithmetic::Exact;
+        let patient = || self.calls.get(Output::Rates as usize).is_none_or(|n| *n >= self.patience);
+        let compiled = !self.interpreted && (exact || patient());
         if compiled && self.shared.outputs[Output::Rates as usize].get().is_some_and(Result::is_ok) {
             Way::Compiled
         } else {
@@ -382,6 +405,11 @@ impl<S: Number> Reducible for Compiled<S> {
         if !self.run(Output::Gaps, [q, v, &[]], &mut [gaps, velocities, entries]) {
             self.interpreter.gaps(q, v, gaps, velocities, entries);
         }
+    }
+
+    fn project_several(&mut self, t: S, q: &Vec<S>, columns: &mut ColumnsOf<S>) -> bool {
+        self.drive_to(t);
+        S::project_several(self, q, columns)
     }
 }
 

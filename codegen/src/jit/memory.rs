@@ -28,12 +28,13 @@ use cranelift::prelude::*;
 
 use super::instructions::{input_places, width, write, Shape, ARGUMENTS, BLOCK, INPUTS};
 use super::vectors::{self, Width};
-use super::CompileError;
+use super::{CompileError, Compiled};
 use crate::code::Code;
 use crate::lower::{is_together, table, Memory, Spills};
 use crate::options::{Arithmetic, Precision};
 use crate::output::OutputProgram;
 use crate::rolled::RolledProgram;
+use mbd_runtime::contact::ColumnsOf;
 use mbd_runtime::kernel::{level, Level};
 use mbd_runtime::system::Real;
 use mbd_runtime::{trig, Packed};
@@ -64,11 +65,16 @@ mod sealed {
     pub trait Sealed: Sized {
         /// With plain products and sums, and with the best arithmetic of the processor.
         const SINES: [Sines<Self>; 2];
+
+        /// Velocities of several momenta at one state: `Reducible::project_several`.
+        fn project_several(of: &mut Compiled<Self>, q: &[Self], columns: &mut ColumnsOf<Self>) -> bool
+        where
+            Self: Number;
     }
 }
 
 macro_rules! number {
-    ($float:ident, $precision:ident, $lanes:path, $slice:path) => {
+    ($float:ident, $precision:ident, $lanes:path, $slice:path, $several:expr) => {
         impl Number for $float {
             const PRECISION: Precision = Precision::$precision;
         }
@@ -90,6 +96,10 @@ macro_rules! number {
                 }
                 [plain, best]
             };
+
+            fn project_several(of: &mut Compiled<$float>, q: &[$float], columns: &mut ColumnsOf<$float>) -> bool {
+                $several(of, q, columns)
+            }
         }
     };
 }
@@ -104,8 +114,8 @@ unsafe fn parts<'a, S>(x: *const S, n: usize, sin: *mut S, cos: *mut S) -> (&'a 
     unsafe { (from_raw_parts(x, n), from_raw_parts_mut(sin, n), from_raw_parts_mut(cos, n)) }
 }
 
-number!(f64, F64, trig::sincos_lanes_f64, trig::sincos_slice_f64);
-number!(f32, F32, trig::sincos_lanes_f32, trig::sincos_slice_f32);
+number!(f64, F64, trig::sincos_lanes_f64, trig::sincos_slice_f64, Compiled::columns_in_lanes);
+number!(f32, F32, trig::sincos_lanes_f32, trig::sincos_slice_f32, |_, _, _| false);
 
 /// The machine code of one output.
 pub struct MachineCode<S> {

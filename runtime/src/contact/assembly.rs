@@ -1,9 +1,9 @@
 //! Velocities for forces of contacts: their inverse inertia `A = Φ M⁻¹Φᵀ` at a state, and its like.
 
-use super::touching::{add_row, along_row};
-use super::{Mode, Touch, Touching, WithContacts};
+use super::touching::{add_entries, add_row, along_entries, along_row};
+use super::{Contact, Mode, Touch, Touching, WithContacts};
 use crate::lists::{copy, get, set};
-use crate::system::Real;
+use crate::system::{Real, Row};
 use crate::Scalar;
 
 /// A force at a contact: of a row, or of the normal row of a contact that slides, together with its friction.
@@ -33,12 +33,9 @@ pub(super) struct Forces<'a, S> {
     pub touches: Option<&'a [Touch<S>]>,
 }
 
-/// The lines of some forces.
-pub(super) fn lines<'a, Y: Touching>(
-    system: &'a Y,
-    of: Forces<'a, Y::Scalar>,
-) -> impl Iterator<Item = Line<Y::Scalar>> + 'a {
-    let contacts = of.contacts.iter().enumerate().filter_map(|(i, &k)| Some((i, system.contacts().get(k)?)));
+/// The lines of some forces, of a mechanism with the contacts `all`.
+pub(super) fn lines<'a, S: Real>(all: &'a [Contact<S>], of: Forces<'a, S>) -> impl Iterator<Item = Line<S>> + 'a {
+    let contacts = of.contacts.iter().enumerate().filter_map(|(i, &k)| Some((i, all.get(k)?)));
     contacts.flat_map(move |(i, c)| {
         let slip = of.touches.and_then(|touches| touches.get(i)?.slip).filter(|_| c.tangents);
         let friction = slip.map(|t| t.map(|t| -(c.friction * t)));
@@ -47,42 +44,100 @@ pub(super) fn lines<'a, Y: Touching>(
     })
 }
 
-impl<Y: Touching> WithContacts<Y> {
-    /// Opens all contacts until [`WithContacts::restore`], and computes the velocities of prescribed motions, to which
-    /// forces add theirs. `open` has [`Mode::Open`] for each contact.
-    pub(super) fn rest(&mut self, t: Y::Scalar, q: &Y::Coordinates, open: &[Mode]) {
-        self.borrow_modes(open);
-        self.response.as_mut().fill(Y::Scalar::zero());
-        self.answer(t, q);
-        copy(self.unit.as_mut(), self.response_v.as_ref());
+/// Momenta at one state, by their number, and what is to become of their velocities: the first are zero, those of unit forces
+/// at contacts follow. [`Touching::project_columns`] takes them.
+#[derive(Debug)]
+pub struct Columns<'a, S> {
+    of: Forces<'a, S>,
+    /// Entries of `Φ`, of all rows.
+    entries: &'a [S],
+    a: &'a mut [S],
+    own: &'a mut [S],
+    /// Velocities of the first column.
+    rest: &'a mut [S],
+}
+
+/// [`Columns`] of a mechanism.
+#[derive(Debug)]
+pub struct ColumnsOf<'a, 'b, S> {
+    columns: &'a mut Columns<'b, S>,
+    contacts: &'a [Contact<S>],
+    rows: &'a [Row],
+    /// Columns of the entries.
+    places: &'a [usize],
+}
+
+impl<'b, S: Real> Columns<'b, S> {
+    /// Of a mechanism with such contacts and rows.
+    pub(super) fn of<'a>(
+        &'a mut self,
+        contacts: &'a [Contact<S>],
+        rows: &'a [Row],
+        places: &'a [usize],
+    ) -> ColumnsOf<'a, 'b, S> {
+        ColumnsOf { columns: self, contacts, rows, places }
+    }
+}
+
+impl<S: Real> ColumnsOf<'_, '_, S> {
+    /// Their number.
+    pub fn count(&self) -> usize {
+        1 + lines(self.contacts, self.columns.of).count()
     }
 
-    /// Velocities of the rows of [`lines`], in columns of the square `a`, for a unit force of each line: the inverse
-    /// inertia of the contacts, if these are all their rows. One solve for each line. The velocities along the lines
-    /// themselves, friction included, go to `own`, which may be empty. After [`WithContacts::look`] and
-    /// [`WithContacts::rest`].
+    /// Writes the momenta of column `i`.
+    pub fn momenta(&self, i: usize, p: &mut [S]) {
+        p.fill(S::zero());
+        let line = i.checked_sub(1).and_then(|i| lines(self.contacts, self.columns.of).nth(i));
+        for (row, force) in line.into_iter().flat_map(|line| line.forces(S::one())) {
+            add_entries(self.rows, self.places, self.columns.entries, row, force, p);
+        }
+    }
+
+    /// Takes the velocities of column `i`, after those of the first one; they are changed.
+    pub fn take(&mut self, i: usize, v: &mut [S]) {
+        let Columns { of, entries, a, own, rest } = &mut *self.columns;
+        let Some(i) = i.checked_sub(1) else { return copy(rest, v) };
+        for (v, rest) in v.iter_mut().zip(rest.iter()) {
+            *v = *v - *rest;
+        }
+        let along = |row: usize| along_entries(self.rows, self.places, entries, row, v);
+        let count = lines(self.contacts, *of).count();
+        for (other, a) in lines(self.contacts, *of).zip(a.iter_mut().skip(i).step_by(count.max(1))) {
+            *a = along(other.row);
+        }
+        if let (Some(own), Some(line)) = (own.get_mut(i), lines(self.contacts, *of).nth(i)) {
+            *own = line.forces(S::one()).fold(S::zero(), |sum, (row, force)| sum + force * along(row));
+        }
+    }
+}
+
+impl<Y: Touching> WithContacts<Y> {
+    /// Opens all contacts until [`WithContacts::restore`]; computes the velocities of the rows of [`lines`], in columns of
+    /// the square `a`, for a unit force of each line: the inverse inertia of the contacts, if these are all their rows.
+    /// One solve for each line, and one for the velocities of prescribed motions, to which forces add theirs; several at
+    /// once where the mechanism can. The velocities along the lines themselves, friction included, go to `own`, which may
+    /// be empty. `open` has [`Mode::Open`] for each contact. After [`WithContacts::look`].
     pub(super) fn responses(
         &mut self,
         (t, q): (Y::Scalar, &Y::Coordinates),
         of: Forces<Y::Scalar>,
+        open: &[Mode],
         a: &mut [Y::Scalar],
         own: &mut [Y::Scalar],
     ) {
-        let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
-        let count = lines(&self.system, of).count();
-        for i in 0..count {
-            let Some(line) = lines(&self.system, of).nth(i) else { return };
-            self.response.as_mut().fill(zero);
-            for (row, force) in line.forces(one) {
-                add_row(&self.system, &self.at.entries, row, force, &mut self.response);
-            }
-            self.answer_from_rest(t, q);
-            for (other, a) in lines(&self.system, of).zip(a.iter_mut().skip(i).step_by(count)) {
-                *a = self.velocity_of(other.row);
-            }
-            if let Some(own) = own.get_mut(i) {
-                *own = line.forces(one).fold(zero, |sum, (row, force)| sum + force * self.velocity_of(row));
-            }
+        self.borrow_modes(open);
+        let WithContacts { system, at, unit: rest, response, response_v, sigma, .. } = self;
+        let mut columns = Columns { of, entries: at.entries.as_ref(), a, own, rest: rest.as_mut() };
+        if system.project_columns(t, q, &mut columns) {
+            return;
+        }
+        for i in 0..=lines(system.contacts(), of).count() {
+            let of = columns.of(system.contacts(), system.rows(), system.entry_columns());
+            of.momenta(i, response.as_mut());
+            system.project_momenta(t, q, response, response_v, sigma);
+            let mut of = columns.of(system.contacts(), system.rows(), system.entry_columns());
+            of.take(i, response_v.as_mut());
         }
     }
 
@@ -95,27 +150,22 @@ impl<Y: Touching> WithContacts<Y> {
         b: &mut [Y::Scalar],
     ) {
         self.response.as_mut().fill(Y::Scalar::zero());
-        for line in lines(&self.system, of) {
+        for line in lines(self.system.contacts(), of) {
             let lambda = get(self.at.lambda.as_ref(), line.row);
             add_row(&self.system, &self.at.entries, line.row, lambda, &mut self.response);
         }
         self.answer_from_rest(t, q);
-        for (line, b) in lines(&self.system, of).zip(b) {
-            *b = self.velocity_of(line.row);
+        for (line, b) in lines(self.system.contacts(), of).zip(b) {
+            *b = along_row(&self.system, &self.at.entries, line.row, &self.response_v);
         }
     }
 
-    /// Velocities of the momenta `self.response` beyond those of [`WithContacts::rest`].
+    /// Velocities of the momenta `self.response` beyond those of prescribed motions, after [`WithContacts::responses`].
     fn answer_from_rest(&mut self, t: Y::Scalar, q: &Y::Coordinates) {
         self.answer(t, q);
         for (v, rest) in self.response_v.as_mut().iter_mut().zip(self.unit.as_ref()) {
             *v = *v - *rest;
         }
-    }
-
-    /// Velocity of a row at the velocities `self.response_v`.
-    fn velocity_of(&self, row: usize) -> Y::Scalar {
-        along_row(&self.system, &self.at.entries, row, &self.response_v)
     }
 
     /// Adds the impulses of some contacts, one number for each of their rows, to the momenta of the state, which are freed

@@ -104,8 +104,7 @@ impl<Y: Touching> Touches<Y> {
         let rows = self.rows();
         let all = Forces { contacts: first(self.order.as_ref(), self.count), touches: None };
         let a = first_mut(self.a.as_mut(), rows * rows);
-        system.rest(t, q, self.open.as_ref());
-        system.responses((t, q), all, a, &mut []);
+        system.responses((t, q), all, self.open.as_ref(), a, &mut []);
         system.restore();
         symmetrize(a, rows);
     }
@@ -195,9 +194,9 @@ impl<Y: Touching> Touches<Y> {
         let Touches { count, order, problem, .. } = self;
         let touches = Some(first(problem.as_ref(), *count));
         let shared = Forces { contacts: first(order.as_ref(), *count), touches };
-        let n = lines(&system.system, shared).count();
-        system.rest(t, q, self.open.as_ref());
-        system.responses((t, q), shared, first_mut(self.a.as_mut(), n * n), self.own.as_mut());
+        let n = lines(system.system.contacts(), shared).count();
+        let a = first_mut(self.a.as_mut(), n * n);
+        system.responses((t, q), shared, self.open.as_ref(), a, self.own.as_mut());
         system.response_to_multipliers((t, q), shared, self.b.as_mut());
         system.restore();
         self.impulses.as_mut().fill(Y::Scalar::zero());

@@ -20,6 +20,7 @@ mod with_contacts;
 
 use crate::Scalar;
 
+pub use assembly::{Columns, ColumnsOf};
 pub use hybrid::{
     Cause, ContactEvent, ContactObserver, ContactRules, ContactStatistics, Hybrid, HybridError, SaltationError,
     Stretch, Tangent,

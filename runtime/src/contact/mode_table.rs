@@ -4,6 +4,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::{Deref, DerefMut};
 
+use super::assembly::{Columns, ColumnsOf};
 use super::{rows_that_act, Contact, Mode, Reach, Touching, Way};
 use crate::interp::Interpreter;
 use crate::system::{
@@ -35,6 +36,12 @@ pub trait Reducible: Constrained<Scalar: Real> + Energetic + Conjugate + Sized {
         velocities: &mut Self::Rows,
         entries: &mut Self::Entries,
     );
+
+    /// [`Constrained::project_momenta`] of several momenta at one state, each with the bits that it has alone. Returns whether
+    /// that was done: [`Touching::project_columns`].
+    fn project_several(&mut self, _t: Self::Scalar, _q: &Self::Coordinates, _of: &mut ColumnsOf<Self::Scalar>) -> bool {
+        false
+    }
 }
 
 impl<S: Real> Reducible for Interpreter<S> {
@@ -87,6 +94,11 @@ impl<Y: Reducible> ModeTable<Y> {
     /// The sets of modes that were met, in the order in which they were.
     pub fn sets_of_modes(&self) -> impl ExactSizeIterator<Item = &[Mode]> {
         self.modes.iter().map(|(modes, _)| modes.as_slice())
+    }
+
+    /// The evaluators of the sets of modes that were met.
+    pub fn evaluators_mut(&mut self) -> impl Iterator<Item = &mut Y> {
+        self.modes.iter_mut().map(|(_, evaluator)| evaluator)
     }
 
     /// Sets the contacts' coefficient of friction, where they have tangential rows.
@@ -274,5 +286,12 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
         self.full.swap_inputs(current);
         self.full.gaps(q, v, gaps, velocities, entries);
         self.full.swap_inputs(current);
+    }
+
+    fn project_columns(&mut self, t: Y::Scalar, q: &Y::Coordinates, columns: &mut Columns<Y::Scalar>) -> bool {
+        let ModeTable { full, modes, current, contacts, .. } = self;
+        let (rows, entries) = (full.rows(), full.entry_columns());
+        let mut of = columns.of(contacts, rows, entries);
+        modes[*current].1.project_several(t, q, &mut of)
     }
 }

@@ -15,7 +15,7 @@
 //! that of an impact with velocities that approach no slower. What friction holds does not move.
 
 use super::instant::Touches;
-use super::solver::impact_by_sweeps;
+use super::solver::{impact_by_sweeps, impact_near};
 use super::{
     impact, ContactError, ContactRules, Effort, HybridError, Impact, ImpactOptions, Problem, Stretch, Touching,
     WithContacts,
@@ -23,7 +23,7 @@ use super::{
 use crate::constrained::PostStep;
 use crate::error::StepError;
 use crate::integrate::{Chart, Point};
-use crate::lists::{copy, first, get, set};
+use crate::lists::{copy, first, get, get_or, part, part_mut, set};
 use crate::system::Real;
 use crate::Scalar;
 use core::marker::PhantomData;
@@ -63,7 +63,7 @@ impl<S: Real> SteppingStatistics<S> {
 
 /// How the impulses of a time step are found.
 pub trait StepImpulses {
-    /// The impulses of a problem, as [`impact`].
+    /// The impulses of a problem, as [`impact`]; `impulses` has those of the last step.
     ///
     /// # Errors
     /// [`ContactError`].
@@ -87,7 +87,7 @@ impl StepImpulses for ByRules {
         work: &mut [S],
     ) -> Result<Impact<S>, ContactError> {
         let options = ImpactOptions { effort: rules.effort, order: rules.order };
-        let result = impact(problem, &options, impulses, work);
+        let result = impact_near(problem, &options, impulses, work);
         match (result, options.effort) {
             (Err(ContactError::NoConvergence { .. }), Effort::ToTolerance { tolerance, rounds }) => {
                 let effort = Effort::ToTolerance { tolerance: tolerance.max(RESIDUAL), rounds };
@@ -132,8 +132,11 @@ pub struct TimeStepping<Y: Touching, B, I = ByRules> {
     p: Y::Momenta,
     qd: Y::Coordinates,
     pd: Y::Momenta,
-    /// Velocities of the rows at the start of the step.
+    /// Whether any contact has restitution; velocities of the rows at the start of the step then.
+    bounces: bool,
     before: Y::Rows,
+    /// Impulses of each contact in the last step.
+    last_impulses: Y::PerContact<[Y::Scalar; 3]>,
     /// Velocities with which coordinates go on.
     v: Y::Momenta,
     /// Whether a contact had an impulse in the last step, and whether it has one in this step.
@@ -181,7 +184,9 @@ where
             p: inner.zero_momenta(),
             qd: inner.neutral(),
             pd: inner.zero_momenta(),
+            bounces: false,
             before: inner.zero_rows(),
+            last_impulses: inner.per_contact([Y::Scalar::zero(); 3]),
             v: inner.zero_momenta(),
             pressed: [inner.per_contact(false), inner.per_contact(false)],
             span: [Y::Scalar::zero(); 2],
@@ -227,14 +232,18 @@ where
         if self.touching.count > 0 {
             copy(self.v.as_mut(), system.at.v.as_ref());
             self.collide(system, t + h)?;
-            system.look(t + h, &self.q, &self.p);
+            system.free(t + h, &self.q, &self.p);
             for (v, after) in self.v.as_mut().iter_mut().zip(system.at.v.as_ref()) {
                 *v = *after - *v;
             }
             self.drift(system, t + h, half)?;
+        } else {
+            self.last_impulses.as_mut().fill([Y::Scalar::zero(); 3]);
         }
-        let closed = self.post_step.close(system, t + h, false, &mut self.q, &mut self.p);
-        closed.map_err(|error| StepError::Constraint { time: t.to_f64(), error })?;
+        if !self.post_step.idle(system, t + h) {
+            let closed = self.post_step.close(system, t + h, false, &mut self.q, &mut self.p);
+            closed.map_err(|error| StepError::Constraint { time: t.to_f64(), error })?;
+        }
         self.span = [t, t + h];
         copy(self.last.0.as_mut(), q.as_ref());
         copy(self.last.1.as_mut(), p.as_ref());
@@ -261,8 +270,8 @@ where
         Ok(())
     }
 
-    /// The end of the step if no contact acts, in `self.q` and `self.p`; velocities of the rows at the start, in
-    /// `self.before`.
+    /// The end of the step if no contact acts, in `self.q` and `self.p`; where contacts have restitution, velocities of the
+    /// rows at the start, in `self.before`.
     fn fall(
         &mut self,
         system: &mut WithContacts<Y>,
@@ -271,10 +280,16 @@ where
         (q, p): (&Y::Coordinates, &Y::Momenta),
     ) -> Result<(), HybridError> {
         let half = Y::Scalar::constant(0.5) * h;
-        system.look(t, q, p);
-        copy(self.before.as_mut(), system.at.velocities.as_ref());
         copy(self.q.as_mut(), q.as_ref());
-        copy(self.p.as_mut(), system.p.as_ref());
+        self.bounces = system.system().contacts().iter().any(|c| c.restitution > Y::Scalar::zero());
+        if system.has_loops() || self.bounces {
+            system.look(t, q, p);
+            copy(self.before.as_mut(), system.at.velocities.as_ref());
+            copy(self.p.as_mut(), system.p.as_ref());
+        } else {
+            // Nothing holds the mechanism between steps.
+            copy(self.p.as_mut(), p.as_ref());
+        }
         self.chart.load(system, t.to_f64(), &self.q, &self.p)?;
         self.start.clear();
         self.rate_at(system, t);
@@ -332,7 +347,7 @@ where
             self.statistics.overlap = larger(self.statistics.overlap, -gap);
             let start = get(self.before.as_ref(), c.row);
             // Forces alone change the rate of the gap by `rate − start` in a step.
-            let bounces = c.restitution > zero && start < (rate - start) + (rate - start);
+            let bounces = self.bounces && c.restitution > zero && start < (rate - start) + (rate - start);
             let ahead = if bounces || !(gap > zero) { zero } else { gap / half };
             if (bounces && gap > zero) || !(rate + ahead < zero || gap < near) {
                 continue;
@@ -353,6 +368,12 @@ where
     fn collide(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar) -> Result<(), HybridError> {
         let touching = &mut self.touching;
         touching.assemble(system, t, &self.q);
+        // The search begins with the impulses of the last step.
+        for (i, k) in first(touching.order.as_ref(), touching.count).iter().enumerate() {
+            let (last, c) =
+                (get_or(self.last_impulses.as_ref(), *k, [Y::Scalar::zero(); 3]), touching.touch(i).contact);
+            copy(part_mut(touching.impulses.as_mut(), c.row, c.rows()), &last);
+        }
         let (problem, impulses, work) = touching.parts();
         let result = I::find(&self.rules, &problem, impulses, work)
             .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
@@ -363,9 +384,13 @@ where
             sum + get(touching.impulses.as_ref(), row) * (get(touching.b.as_ref(), row) - system.gap_rate(*k))
         });
         system.kick(touching.order(), touching.impulses.as_ref());
+        self.last_impulses.as_mut().fill([Y::Scalar::zero(); 3]);
         for (k, touch) in first(touching.order.as_ref(), touching.count).iter().zip(touching.problem.as_ref()) {
-            let impulse = get(touching.impulses.as_ref(), touch.contact.row);
-            set(self.pressed[1].as_mut(), *k, impulse > Y::Scalar::zero());
+            let own = part(touching.impulses.as_ref(), touch.contact.row, touch.contact.rows());
+            let mut impulse = [Y::Scalar::zero(); 3];
+            copy(&mut impulse, own);
+            set(self.last_impulses.as_mut(), *k, impulse);
+            set(self.pressed[1].as_mut(), *k, impulse[0] > Y::Scalar::zero());
         }
         copy(self.p.as_mut(), system.p.as_ref());
         let s = &mut self.statistics;

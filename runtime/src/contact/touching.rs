@@ -1,8 +1,9 @@
 //! The trait through which a motion with events uses a mechanism with contacts.
 
+use super::assembly::Columns;
 use super::{Contact, Mode, Way};
 use crate::constrained::rows::row;
-use crate::system::{Constrained, Real};
+use crate::system::{Constrained, Real, Row};
 use crate::Scalar;
 
 /// How fast a velocity can close the gap of a contact.
@@ -61,6 +62,16 @@ pub trait Touching: Constrained<Scalar: Real> {
         velocities: &mut Self::Rows,
         entries: &mut Self::Entries,
     );
+    /// [`Constrained::project_momenta`] of several momenta at one state, for all of whose velocities there is a use; each has the
+    /// bits that it has alone. Returns whether that was done: where several are no faster than one after the other, nothing is.
+    fn project_columns(
+        &mut self,
+        _t: Self::Scalar,
+        _q: &Self::Coordinates,
+        _columns: &mut Columns<Self::Scalar>,
+    ) -> bool {
+        false
+    }
 }
 
 /// Adds row `r` of `Φ` times `factor` to a list of momenta.
@@ -71,18 +82,26 @@ pub(super) fn add_row<Y: Constrained>(
     factor: Y::Scalar,
     p: &mut Y::Momenta,
 ) {
-    let Some(of) = system.rows().get(r) else { return };
-    for (column, entry) in row(of, system.entry_columns(), entries.as_ref()) {
-        if let Some(p) = p.as_mut().get_mut(*column) {
+    add_entries(system.rows(), system.entry_columns(), entries.as_ref(), r, factor, p.as_mut());
+}
+
+/// Row `r` of `Φ` times velocities.
+pub(super) fn along_row<Y: Constrained>(system: &Y, entries: &Y::Entries, r: usize, v: &Y::Momenta) -> Y::Scalar {
+    along_entries(system.rows(), system.entry_columns(), entries.as_ref(), r, v.as_ref())
+}
+
+/// [`add_row`] of a system with such rows.
+pub(super) fn add_entries<S: Scalar>(rows: &[Row], columns: &[usize], entries: &[S], r: usize, factor: S, p: &mut [S]) {
+    let Some(of) = rows.get(r) else { return };
+    for (column, entry) in row(of, columns, entries) {
+        if let Some(p) = p.get_mut(*column) {
             *p = *p + *entry * factor;
         }
     }
 }
 
-/// Row `r` of `Φ` times velocities.
-pub(super) fn along_row<Y: Constrained>(system: &Y, entries: &Y::Entries, r: usize, v: &Y::Momenta) -> Y::Scalar {
-    let zero = Y::Scalar::zero();
-    let Some(of) = system.rows().get(r) else { return zero };
-    let terms = row(of, system.entry_columns(), entries.as_ref());
-    terms.fold(zero, |sum, (column, entry)| v.as_ref().get(*column).map_or(sum, |v| sum + *entry * *v))
+/// [`along_row`] of a system with such rows.
+pub(super) fn along_entries<S: Scalar>(rows: &[Row], columns: &[usize], entries: &[S], r: usize, v: &[S]) -> S {
+    let Some(of) = rows.get(r) else { return S::zero() };
+    row(of, columns, entries).fold(S::zero(), |sum, (column, entry)| v.get(*column).map_or(sum, |v| sum + *entry * *v))
 }

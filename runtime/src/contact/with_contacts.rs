@@ -114,6 +114,11 @@ impl<Y: Touching> WithContacts<Y> {
         &self.system
     }
 
+    /// Gives the mechanism back.
+    pub fn into_system(self) -> Y {
+        self.system
+    }
+
     /// The mechanism, for setting its inputs. Its modes must not be changed.
     pub fn system_mut(&mut self) -> &mut Y {
         &mut self.system
@@ -142,6 +147,12 @@ impl<Y: Touching> WithContacts<Y> {
     /// Whether contact `k` begins to slide.
     fn begins(&self, k: usize) -> bool {
         get_or(self.begins.as_ref(), k, false)
+    }
+
+    /// Whether there are rows that are no contacts': of loops and couplings.
+    pub(super) fn has_loops(&self) -> bool {
+        let of_contacts: usize = self.system.contacts().iter().map(Contact::rows).sum();
+        self.system.rows().len() > of_contacts
     }
 
     /// Whether all contacts are open.
@@ -217,10 +228,15 @@ impl<Y: Touching> WithContacts<Y> {
         self.system.contacts().get(k).map_or(Contact::nowhere(), |contact| *contact)
     }
 
-    /// Velocities, gaps and their like at a state, in `self.at`.
-    pub(super) fn look(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
+    /// Momenta freed of multipliers, in `self.p`, and their velocities, in `self.at.v`.
+    pub(super) fn free(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
         copy(self.p.as_mut(), p.as_ref());
         self.system.project_momenta(t, q, &mut self.p, &mut self.at.v, &mut self.sigma);
+    }
+
+    /// Velocities, gaps and their like at a state, in `self.at`.
+    pub(super) fn look(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
+        self.free(t, q, p);
         let Contacts { v, gaps, velocities, entries, .. } = &mut self.at;
         self.system.gaps(t, q, v, gaps, velocities, entries);
     }
@@ -400,7 +416,7 @@ impl<Y: Touching> WithContacts<Y> {
             let zero = Y::Scalar::zero();
             let (lambda, friction) = (self.at.lambda.as_mut(), &mut self.friction);
             lambda.fill(zero);
-            for (line, force) in lines(&self.system, instant.sharing()).zip(instant.impulses.as_ref()) {
+            for (line, force) in lines(self.system.contacts(), instant.sharing()).zip(instant.impulses.as_ref()) {
                 for (i, (row, force)) in line.forces(*force).enumerate() {
                     set(lambda, row, -force);
                     if i > 0 {
@@ -543,8 +559,7 @@ impl<Y: Touching> Constrained for WithContacts<Y> {
 
     /// Rows of loops and couplings always act, those of contacts that are closed do.
     fn rows_act(&self) -> bool {
-        let of_contacts: usize = self.system.contacts().iter().map(Contact::rows).sum();
-        self.closed || self.system.rows().len() > of_contacts
+        self.closed || self.has_loops()
     }
 
     fn entry_columns(&self) -> &[usize] {

@@ -1,13 +1,15 @@
 //! Motions by time steps: order 1 against motions by events and known answers, friction that holds, energy that falls.
 
 use mbd_codegen::model::Model;
+use mbd_codegen::options::Arithmetic;
 use mbd_codegen::plan::Plan;
+use mbd_codegen::Options;
 use mbd_runtime::catalogue::{self, BoxedMethod};
 use mbd_runtime::constrained::WithPostStep;
 use mbd_runtime::constrained::{Effort, Projection, Stabilisation};
 use mbd_runtime::contact::{
     ByRules, ContactError, ContactMotion, ContactObserver, Effort as ContactEffort, FixedSweeps, HybridError, Regime,
-    RegimeChange, RegimeChoice, RegimeReason, RegimeRules, StepImpulses, SteppingStatistics, TimeStepping,
+    RegimeChange, RegimeChoice, RegimeReason, RegimeRules, StepImpulses, SteppingStatistics, TimeStepping, Touching,
     WithContacts,
 };
 use mbd_runtime::integrate::{Step, Tolerances};
@@ -349,4 +351,32 @@ fn only_time_steps() {
     let (q, p) = motion.run(stepped.t);
     assert_eq!((q, p), (stepped.q, stepped.p));
     assert_eq!(motion.motion.statistics().time, [0.0, stepped.t]);
+}
+
+/// Coordinates and momenta of a quadruped that has been dropped and kneels.
+fn kneeling<Y>(mut mechanism: Y, plan: &Plan) -> (Vec<f64>, Vec<f64>)
+where
+    Y: Touching<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>> + Conjugate,
+{
+    let mut q = plan.start();
+    let v = vec![0.0; plan.dims.nv];
+    let mut p = v.clone();
+    mechanism.conjugate_momenta(&q, &v, &mut p);
+    let mut system = WithContacts::new(mechanism);
+    let mut stepping = TimeStepping::new(&mut system, ());
+    for k in 0..150 {
+        stepping.step(&mut system, 2e-3 * f64::from(k), 2e-3, &mut q, &mut p).unwrap();
+    }
+    assert!(stepping.statistics().most >= 4);
+    (q, p)
+}
+
+/// Machine code computes several columns of the inverse inertia at once: they have the bits of single ones.
+#[test]
+fn columns_at_once_have_the_bits_of_single_ones() {
+    let model = model(include_str!("../../../models/contacts/quadruped.toml"));
+    let plan = Plan::new(&model, 1e-9);
+    let options = Options { arithmetic: Arithmetic::Exact, ..Options::default() };
+    let machine = plan.compiled_with_contacts::<f64>(&options, 10).unwrap();
+    assert_eq!(kneeling(plan.default_contact_interpreter::<f64>(), &plan), kneeling(machine, &plan));
 }

@@ -2,7 +2,8 @@
 
 use super::local::Block;
 use super::{
-    energy, finite, fits, routh, solve_above, swept, velocity, Certificate, ContactError, Effort, Problem, Terms,
+    energy, finite, fits, routh, solve_above, solve_near, swept, velocity, Certificate, ContactError, Effort, Problem,
+    Terms,
 };
 use crate::contact::RestitutionLaw;
 use crate::lists::{copy, get, part_mut, set, split};
@@ -81,6 +82,26 @@ pub fn impact<S: Real>(
         simultaneous(problem, solve, impulses, work, &mut result)?;
     }
     judged(problem, impulses, result)
+}
+
+/// [`impact`] from impulses that solve a problem nearby: without restitution and all at once, steps of Newton's method begin
+/// there. One contact alone is solved exactly, wherever the search begins.
+///
+/// # Errors
+/// As of [`impact`].
+pub(in crate::contact) fn impact_near<S: Real>(
+    problem: &Problem<S>,
+    options: &ImpactOptions,
+    impulses: &mut [S],
+    work: &mut [S],
+) -> Result<Impact<S>, ContactError> {
+    let known = problem.touches.len() > 1 && impulses.iter().any(|p| *p != S::zero());
+    if !known || bounces(problem) || options.order == ImpactOrder::Sequential {
+        return impact(problem, options, impulses, work);
+    }
+    finite(problem)?;
+    let certificate = solve_near(problem, options.effort, impulses, work)?;
+    judged(problem, impulses, Impact { certificate, ..Impact::none() })
 }
 
 /// [`impact`] of all contacts at once by a fixed number of sweeps. A single contact with restitution has the impulses of

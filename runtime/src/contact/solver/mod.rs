@@ -23,8 +23,8 @@ use crate::system::Real;
 
 pub(super) use newton::eliminate;
 
-pub(super) use impact::impact_by_sweeps;
 pub use impact::{impact, Impact, ImpactOptions, ImpactOrder};
+pub(super) use impact::{impact_by_sweeps, impact_near};
 
 /// A contact of a problem.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -147,7 +147,12 @@ pub(in crate::contact) fn eliminate<S: Real>(matrix: &mut [S], rhs: &mut [S]) ->
         let (pivot, own) = (get(line, k), get(rhs, k));
         for (other, rhs) in below.chunks_exact_mut(n).zip(rhs.iter_mut().skip(k + 1)) {
             let factor = get(other, k) / pivot;
-            for (x, by) in other.iter_mut().zip(line).skip(k + 1) {
+            // Rows of contacts that are open have one entry.
+            if factor == S::zero() && factor.derivative().is_none() {
+                continue;
+            }
+            let right = n - (k + 1);
+            for (x, by) in part_mut(other, k + 1, right).iter_mut().zip(part(line, k + 1, right)) {
                 *x = *x - factor * *by;
             }
             *rhs = *rhs - factor * own;
