@@ -50,10 +50,11 @@ trap 'rm -f "$log"' EXIT
 
 # build SCENE: prints the path of the image; the compiler's messages only if it fails (it warns of +fp64 every time).
 build() {
-    local scene=$1 directory extra
+    # One folder for both boards: the generator in it is that of the host, and is compiled once.
+    local scene=$1 directory=target/boards extra
     case $scene in
-        *_f32) directory=target/m4f extra="-C target-cpu=cortex-m4" ;;
-        *_f64) directory=target/m7 extra="-C target-cpu=cortex-m7 -C target-feature=+fp64" ;;
+        *_f32) extra="-C target-cpu=cortex-m4" ;;
+        *_f64) extra="-C target-cpu=cortex-m7 -C target-feature=+fp64" ;;
         *) fail "$scene: the name of a scene ends in _f32 or _f64" ;;
     esac
     "${cross[@]}" RUSTFLAGS="$flags $extra" cargo build "${build_args[@]}" --bin "$scene" --target-dir "$directory" \

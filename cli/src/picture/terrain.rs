@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 
+use multibody::codegen::model::ShapeKind;
 use multibody::runtime::field::Field;
 use multibody::runtime::sweep::FrameState;
 
@@ -11,6 +12,14 @@ use super::view::{Page, View};
 /// Lines along either axis, and points of each.
 const LINES: usize = 9;
 const POINTS: usize = 80;
+
+/// The ground of a shape that is a height field.
+pub fn field_of(kind: &ShapeKind) -> Option<&'static Field> {
+    match *kind {
+        ShapeKind::HeightField { field, .. } => Some(field),
+        _ => None,
+    }
+}
 
 /// Lines on a height field with its axes at a pose, as far as what is seen goes.
 pub fn lines(field: &Field, at: &FrameState<f64>, seen: &[[f64; 3]]) -> Vec<Vec<[f64; 3]>> {

@@ -12,7 +12,7 @@ use multibody::runtime::Interpreter;
 
 use super::limbs;
 use super::shapes::Line;
-use super::terrain::lines;
+use super::terrain::{field_of, lines};
 use super::view::{Page, View};
 
 /// Part of the page's size below which corners of outlines are left out: round ones stay round.
@@ -181,10 +181,10 @@ impl Touch {
                     let size = sizes.fold(0.0, f64::max);
                     planes.push(Plane { frame, normal: unit(normal), patch: shape.mount.body.map(|_| size) });
                 }
-                ShapeKind::HeightField { field, .. } => {
-                    terrains.extend(shape.mount.body.is_none().then_some(Terrain { frame, field }));
-                }
                 ref kind => {
+                    if let (Some(field), None) = (field_of(kind), shape.mount.body) {
+                        terrains.push(Terrain { frame, field });
+                    }
                     let points = surface(kind);
                     if !points.is_empty() {
                         solids.push(Solid { frame, points, colour: shape.mount.body.map(|b| colours[b]) });
