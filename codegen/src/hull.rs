@@ -268,9 +268,15 @@ fn is_flat(points: &[Vec3]) -> bool {
 /// Points nearer to the plane of a face than this are on it, in units of the longest extent along an axis: rounding.
 const FLAT: f64 = 1e-12;
 
-/// The polyhedron of points that are its corners. `None` where they lie on a line, and where rounding does not tell which of
-/// them are on one face. Equal ones exist once, for as long as the program runs.
+/// Corners up to which faces are looked for, which takes a time that grows with the cube of their number.
+const MOST: usize = 500;
+
+/// The polyhedron of points that are its corners. `None` where they lie on a line or are more than 500, and where rounding does
+/// not tell which of them are on one face. Equal ones exist once, for as long as the program runs.
 pub(crate) fn polyhedron(corners: &[Vec3]) -> Option<&'static Polyhedron> {
+    if corners.len() > MOST {
+        return None;
+    }
     static ALL: Mutex<Option<HashMap<Vec<u64>, Option<&'static Polyhedron>>>> = Mutex::new(None);
     let mut all = ALL.lock().unwrap_or_else(PoisonError::into_inner);
     let bits = corners.iter().flatten().map(|x| x.to_bits()).collect();

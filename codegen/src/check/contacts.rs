@@ -233,8 +233,8 @@ impl Pair {
 /// Why nothing is known of the faces of a hull.
 #[cfg(feature = "hulls")]
 const NO_FACES: &str =
-    "the corners of the hull lie on a line, or rounding does not tell which of them are on one face: leave some out, or write \
-     a smaller `most`";
+    "the corners of the hull lie on a line or are more than 500, or rounding does not tell which of them are on one face: leave \
+     some out, or write a smaller `most`";
 #[cfg(not(feature = "hulls"))]
 use crate::import::hull::WITHOUT as NO_FACES;
 
