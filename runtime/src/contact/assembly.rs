@@ -88,25 +88,57 @@ impl<S: Real> ColumnsOf<'_, '_, S> {
     /// Writes the momenta of column `i`.
     pub fn momenta(&self, i: usize, p: &mut [S]) {
         p.fill(S::zero());
-        let line = i.checked_sub(1).and_then(|i| lines(self.contacts, self.columns.of).nth(i));
-        for (row, force) in line.into_iter().flat_map(|line| line.forces(S::one())) {
-            add_entries(self.rows, self.places, self.columns.entries, row, force, p);
+        if let Some(line) = i.checked_sub(1).and_then(|i| lines(self.contacts, self.columns.of).nth(i)) {
+            Places { rows: self.rows, columns: self.places, entries: self.columns.entries }.unit_force(line, p);
         }
     }
 
     /// Takes the velocities of column `i`, after those of the first one; they are changed.
     pub fn take(&mut self, i: usize, v: &mut [S]) {
-        let Columns { of, entries, a, own, rest } = &mut *self.columns;
+        let ColumnsOf { rows, places, contacts, columns: Columns { of, entries, a, own, rest } } = self;
+        let places = Places { rows, columns: places, entries };
         let Some(i) = i.checked_sub(1) else { return copy(rest, v) };
-        for (v, rest) in v.iter_mut().zip(rest.iter()) {
+        let count = lines(contacts, *of).count();
+        if let Some(line) = lines(contacts, *of).nth(i) {
+            places.take_answer((i, count, line), lines(contacts, *of), (rest, v), (a, own));
+        }
+    }
+}
+
+/// The entries of `Φ`.
+#[derive(Clone, Copy)]
+struct Places<'a, S> {
+    rows: &'a [Row],
+    columns: &'a [usize],
+    entries: &'a [S],
+}
+
+impl<S: Real> Places<'_, S> {
+    /// Adds the momenta of a unit force of a line.
+    #[inline(always)]
+    fn unit_force(self, line: Line<S>, p: &mut [S]) {
+        for (row, force) in line.forces(S::one()) {
+            add_entries(self.rows, self.columns, self.entries, row, force, p);
+        }
+    }
+
+    /// Takes the velocities that line `i` of `count` answers with, beyond those at rest, into its column of `a` and into `own`.
+    #[inline(always)]
+    fn take_answer(
+        self,
+        (i, count, line): (usize, usize, Line<S>),
+        all: impl Iterator<Item = Line<S>>,
+        (rest, v): (&[S], &mut [S]),
+        (a, own): (&mut [S], &mut [S]),
+    ) {
+        for (v, rest) in v.iter_mut().zip(rest) {
             *v = *v - *rest;
         }
-        let along = |row: usize| along_entries(self.rows, self.places, entries, row, v);
-        let count = lines(self.contacts, *of).count();
-        for (other, a) in lines(self.contacts, *of).zip(a.iter_mut().skip(i).step_by(count.max(1))) {
+        let along = |row: usize| along_entries(self.rows, self.columns, self.entries, row, v);
+        for (other, a) in all.zip(a.iter_mut().skip(i).step_by(count.max(1))) {
             *a = along(other.row);
         }
-        if let (Some(own), Some(line)) = (own.get_mut(i), lines(self.contacts, *of).nth(i)) {
+        if let Some(own) = own.get_mut(i) {
             *own = line.forces(S::one()).fold(S::zero(), |sum, (row, force)| sum + force * along(row));
         }
     }
@@ -132,12 +164,20 @@ impl<Y: Touching> WithContacts<Y> {
         if system.project_columns(t, q, &mut columns) {
             return;
         }
-        for i in 0..=lines(system.contacts(), of).count() {
-            let of = columns.of(system.contacts(), system.rows(), system.entry_columns());
-            of.momenta(i, response.as_mut());
+        // One after the other, without what the mechanism would have to be asked for: firmware knows its rows.
+        let Columns { a, own, rest, .. } = columns;
+        response.as_mut().fill(Y::Scalar::zero());
+        system.project_momenta(t, q, response, response_v, sigma);
+        copy(rest, response_v.as_ref());
+        let count = lines(system.contacts(), of).count();
+        for i in 0..count {
+            let Some(line) = lines(system.contacts(), of).nth(i) else { return };
+            response.as_mut().fill(Y::Scalar::zero());
+            let places = Places { rows: system.rows(), columns: system.entry_columns(), entries: at.entries.as_ref() };
+            places.unit_force(line, response.as_mut());
             system.project_momenta(t, q, response, response_v, sigma);
-            let mut of = columns.of(system.contacts(), system.rows(), system.entry_columns());
-            of.take(i, response_v.as_mut());
+            let places = Places { rows: system.rows(), columns: system.entry_columns(), entries: at.entries.as_ref() };
+            places.take_answer((i, count, line), lines(system.contacts(), of), (rest, response_v.as_mut()), (a, own));
         }
     }
 
