@@ -9,7 +9,7 @@ use multibody::codegen::jit::Compiled;
 use multibody::codegen::model::ConstraintKind;
 use multibody::codegen::plan::Plan;
 use multibody::codegen::{Arithmetic, Options};
-use multibody::runtime::catalogue::{self, BoxedMethod};
+use multibody::runtime::catalogue::BoxedMethod;
 use multibody::runtime::constrained::{Effort, Projection, WithPostStep};
 use multibody::runtime::contact::{
     ContactEvent, ContactMotion, ContactObserver, ContactStatistics, HybridError, Mode, ModeTable, Regime,
@@ -136,25 +136,12 @@ impl ContactObserver<Mechanism> for Observer {
 
 /// The method of the settings around which contacts are followed.
 fn method(settings: &Settings, system: &System) -> Outcome<BoxedMethod<'static, System>> {
-    let close = || projection(settings, system);
-    match (catalogue::explicit(settings.method, system, false), settings.step) {
+    let mut method = settings.method(system)?;
+    if settings.is_explicit() && matches!(settings.step, Step::Adaptive(_)) {
         // What slides slowly is stiff.
-        (Some(method), Step::Adaptive(_)) => {
-            let method = AutoSwitch::new(system, method, Radau5::new(system));
-            Ok(Box::new(WithPostStep::new(system, method, close())))
-        }
-        (Some(method), Step::Fixed(_)) => Ok(Box::new(WithPostStep::new(system, method, close()))),
-        (None, _) => {
-            let names = || catalogue::entries().map(|entry| entry.name).collect::<Vec<_>>().join(", ");
-            let method = catalogue::implicit(settings.method, system, false).ok_or_else(|| {
-                Failure::new(
-                    format!("--method {}: no such method", settings.method),
-                    format!("take one of {}", names()),
-                )
-            })?;
-            Ok(Box::new(WithPostStep::new(system, method, close())))
-        }
+        method = Box::new(AutoSwitch::new(system, method, Radau5::new(system)));
     }
+    Ok(Box::new(WithPostStep::new(system, method, projection(settings, system))))
 }
 
 /// What closes loops and contacts.

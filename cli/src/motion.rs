@@ -15,7 +15,7 @@ use multibody::runtime::constrained::{
 };
 use multibody::runtime::contact::RegimeRules;
 use multibody::runtime::integrate::{Control, EnergyProjection, Solver, Statistics, Step, StepError};
-use multibody::runtime::{Constrained, Interpreter, Real, Scalar, System};
+use multibody::runtime::{Constrained, Differentiable, Interpreter, Real, Scalar, System};
 
 use super::control::{Controller, Driven, Loads};
 use super::energy::Balance;
@@ -61,6 +61,17 @@ impl Settings<'_> {
         let mut times = self.control.as_ref().map_or(Vec::new(), |control| control.instants(self.time));
         times.push(self.time);
         times
+    }
+
+    /// Whether the method needs no derivatives of the rates.
+    pub fn is_explicit(&self) -> bool {
+        catalogue::EXPLICIT.iter().any(|entry| entry.name == self.method)
+    }
+
+    /// The method for a mechanism.
+    pub fn method<Y: Differentiable<Scalar = f64> + 'static>(&self, system: &Y) -> Outcome<BoxedMethod<'static, Y>> {
+        catalogue::any(self.method, system, false)
+            .ok_or_else(|| Failure::new(format!("no method `{}`", self.method), "mbd simulate --help lists them"))
     }
 
     /// What the ends of steps may do.
@@ -305,8 +316,7 @@ pub fn driver(
     (t, q, p): (f64, &Vec<f64>, &Vec<f64>),
     met: &Rc<RefCell<Drift>>,
 ) -> Outcome<Driver<'static, Timed>> {
-    let mut method = catalogue::any(settings.method, system, false)
-        .ok_or_else(|| Failure::new(format!("no method `{}`", settings.method), "mbd simulate --help lists them"))?;
+    let mut method = settings.method(system)?;
     if !system.rows().is_empty() {
         let hold = Projection::new(system, settings.hold, settings.effort());
         method = Box::new(WithPostStep::new(system, method, Keeper { hold, met: met.clone() }));

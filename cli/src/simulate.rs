@@ -180,8 +180,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
 /// Settings with the control of the arguments, if there is any, for a motion that starts at `q`.
 pub fn controlled<'a>(plan: &Plan, args: &MotionArgs, settings: Settings<'a>, q: &[f64]) -> Outcome<Settings<'a>> {
     let control = Controller::new(plan, &args.control, q, &columns::all(plan))?;
-    let explicit = catalogue::EXPLICIT.iter().any(|entry| entry.name == settings.method);
-    if control.as_ref().is_some_and(|control| !control.has_derivatives()) && !explicit {
+    if control.as_ref().is_some_and(|control| !control.has_derivatives()) && !settings.is_explicit() {
         let names: Vec<&str> = catalogue::EXPLICIT.iter().map(|entry| entry.name).collect();
         return Err(Failure::new(
             format!("--method {}: the derivatives of --gravity-compensation are not known to it", settings.method),

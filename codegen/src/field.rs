@@ -1,9 +1,8 @@
 //! Height fields: the spline through given heights, its bounds, and whether a ball fits into its hollows.
 
-use std::collections::HashMap;
-use std::sync::{Mutex, PoisonError};
-
 use mbd_runtime::field::{Ball, Field, Foot};
+
+use crate::known::Known;
 
 /// Most heights of a field.
 pub(crate) const MOST: usize = 65_536;
@@ -34,17 +33,9 @@ pub(crate) fn field(spacing: [f64; 2], heights: &[Vec<f64>]) -> &'static Field {
     let inside = |n: usize| kept((0..n).map(|k| if k == 0 || k + 1 == n { 0.0 } else { 1.0 }).collect());
     let all = Field { spacing, points, net: kept(net), cells: cells.map(cell), inside: cells.map(inside), slope };
     // As the tables, equal fields exist once.
-    static ALL: Mutex<Vec<&'static Field>> = Mutex::new(Vec::new());
-    let mut known = ALL.lock().unwrap_or_else(PoisonError::into_inner);
-    let same = |field: &&&Field| {
-        (field.net.as_ptr(), field.points, field.spacing) == (all.net.as_ptr(), all.points, all.spacing)
-    };
-    if let Some(field) = known.iter().find(same) {
-        return field;
-    }
-    let field = Box::leak(Box::new(all));
-    known.push(field);
-    field
+    static ALL: Known<(usize, [usize; 2], [u64; 2]), &Field> = Known::new();
+    let key = (all.net.as_ptr() as usize, all.points, all.spacing.map(f64::to_bits));
+    ALL.get(key, || Box::leak(Box::new(all)))
 }
 
 /// Control numbers of the spline through numbers that are one apart, with three more like the first one in front of it, and
@@ -91,10 +82,9 @@ fn length(x: f64, y: f64) -> f64 {
 /// A table that stays for as long as the program runs: code that was made at run time reads it, and the operations of the
 /// symbolic core name it by its place. Equal tables exist once.
 fn kept(table: Vec<f64>) -> &'static [f64] {
-    static ALL: Mutex<Option<HashMap<Vec<u64>, &'static [f64]>>> = Mutex::new(None);
-    let mut all = ALL.lock().unwrap_or_else(PoisonError::into_inner);
+    static ALL: Known<Vec<u64>, &[f64]> = Known::new();
     let bits = table.iter().map(|x| x.to_bits()).collect();
-    all.get_or_insert_with(HashMap::new).entry(bits).or_insert_with(|| Box::leak(table.into_boxed_slice()))
+    ALL.get(bits, || Box::leak(table.into_boxed_slice()))
 }
 
 /// A place where a ball does not follow the ground.
@@ -125,10 +115,8 @@ const NEAR: f64 = 1e-6;
 /// Tries a ball on the heights, on the middles of the cells and of their edges, also where the ground becomes level beside the
 /// grid.
 pub(crate) fn fit(field: &'static Field, radius: f64) -> Fit {
-    static KNOWN: Mutex<Option<HashMap<(usize, u64), Fit>>> = Mutex::new(None);
-    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    let key = (std::ptr::from_ref(field) as usize, radius.to_bits());
-    *known.get_or_insert_with(HashMap::new).entry(key).or_insert_with(|| tried(field, radius))
+    static ALL: Known<(usize, u64), Fit> = Known::new();
+    ALL.get((std::ptr::from_ref(field) as usize, radius.to_bits()), || tried(field, radius))
 }
 
 fn tried(field: &Field, radius: f64) -> Fit {

@@ -19,6 +19,8 @@ mod import;
 mod inertia;
 #[cfg(feature = "jit")]
 pub mod jit;
+#[cfg(any(feature = "height_fields", feature = "hulls"))]
+mod known;
 mod lower;
 pub mod model;
 pub mod modes;

@@ -142,6 +142,9 @@ fn surface(kind: &ShapeKind) -> Vec<[f64; 3]> {
             let side = |corner: usize, k: usize| if corner >> k & 1 == 0 { -0.5 * size[k] } else { 0.5 * size[k] };
             (0..8).map(|corner| [0, 1, 2].map(|k| side(corner, k))).collect()
         }
+        ShapeKind::Hull { ref points, rounding } if rounding > 0.0 => {
+            points.iter().flat_map(|p| ellipsoid(*p, [rounding; 3])).collect()
+        }
         ShapeKind::Hull { ref points, .. } => points.clone(),
         // Points, planes and height fields.
         _ => Vec::new(),

@@ -7,9 +7,10 @@ use mbd_runtime::contact::{ColumnsOf, Contact, Reach, Reducible, Way};
 use mbd_runtime::tree::row_order::RowProducts;
 use mbd_runtime::Interpreter;
 
+use super::columns::Several;
 use super::given::Given;
 use super::instructions::width;
-use super::lanes::{AllLanes, Several};
+use super::lanes::AllLanes;
 use super::memory::{MachineCode, Number};
 use super::{vectors, CompileError};
 use crate::code::{compile, Code};

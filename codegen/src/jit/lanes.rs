@@ -2,7 +2,6 @@
 
 use std::sync::{Arc, OnceLock};
 
-use mbd_runtime::contact::ColumnsOf;
 use mbd_runtime::system::{LieJoint, Part, System};
 use mbd_runtime::{Interpreter, Packed, Scalar};
 
@@ -80,6 +79,13 @@ impl Compiled<f64> {
         (0..L).for_each(|lane| lanes.take_inputs(lane, self));
         Ok(lanes)
     }
+
+    /// The fields, in the order of their table.
+    pub(super) fn fields(&self) -> [&[f64]; FIELDS.len()] {
+        let Interpreter { tau, drive_q, drive_v, drive_a, wrenches, gravity, .. } = &self.interpreter;
+        let gravity = if self.sizes().gravity > 0 { &gravity[..] } else { &[] };
+        [tau, drive_q, drive_v, drive_a, wrenches.as_flattened(), self.parameters(), &self.acts, gravity]
+    }
 }
 
 impl<const L: usize> CompiledLanes<L> {
@@ -145,7 +151,7 @@ impl Shared<f64> {
     }
 
     /// The code of an output for several states, made when it is first asked for.
-    fn in_lanes(&self, output: Output, lanes: usize) -> Result<&MachineCode<f64>, CompileError> {
+    pub(super) fn in_lanes(&self, output: Output, lanes: usize) -> Result<&MachineCode<f64>, CompileError> {
         let make = || self.compiled(output, lanes);
         // The list has the order of the enumeration.
         self.of_width(lanes)?.outputs[output as usize].get_or_init(make).as_ref().map_err(CompileError::clone)
@@ -203,81 +209,6 @@ fn one_by_one<const L: usize>(code: &MachineCode<f64>, given: &[&[f64]; INPUTS],
 fn set<const L: usize>(to: &mut Vec<f64>, lane: usize, from: &[f64]) {
     to.resize(L * from.len(), 0.0);
     to.chunks_exact_mut(L).zip(from).for_each(|(to, from)| to[lane] = *from);
-}
-
-/// Memory for several states at once: coordinates, momenta, velocities, momenta freed of multipliers, multipliers; the fields.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Several<S> {
-    state: [Vec<S>; 5],
-    fields: [Vec<S>; FIELDS.len()],
-    one: Vec<S>,
-}
-
-/// Columns for which vectors are worth filling.
-const WORTHWHILE: usize = 3;
-
-impl Compiled<f64> {
-    /// Velocities of several momenta at one state, as many at once as vectors have numbers.
-    pub(super) fn columns_in_lanes(&mut self, q: &[f64], columns: &mut ColumnsOf<f64>) -> bool {
-        let count = columns.count();
-        if count < WORTHWHILE || self.interprets(Output::ProjectMomenta) {
-            return false;
-        }
-        match best_lanes() {
-            8 => self.columns_in::<8>(q, columns, count),
-            4 => self.columns_in::<4>(q, columns, count),
-            _ => self.columns_in::<2>(q, columns, count),
-        }
-    }
-
-    fn columns_in<const L: usize>(&mut self, q: &[f64], columns: &mut ColumnsOf<f64>, count: usize) -> bool {
-        let shared = self.shared.clone();
-        let Ok(code) = shared.in_lanes(Output::ProjectMomenta, L) else { return false };
-        let mut several = std::mem::take(&mut self.several);
-        let Several { state: [coordinates, p, v, free, sigma], fields, one } = &mut several;
-        coordinates.clear();
-        coordinates.extend(q.iter().flat_map(|x| [*x; L]));
-        let (nv, rows) = (shared.sizes().nv, shared.sizes().rows);
-        one.resize(nv, 0.0);
-        for (all, len) in [(&mut *p, nv), (&mut *v, nv), (&mut *free, nv), (&mut *sigma, rows)] {
-            all.resize(L * len, 0.0);
-        }
-        for (to, from) in fields.iter_mut().zip(self.fields()) {
-            to.clear();
-            to.extend(from.iter().flat_map(|x| [*x; L]));
-        }
-        if self.scratch.len() < code.scratch() {
-            self.scratch.resize(code.scratch(), 0.0);
-        }
-        let mut done = true;
-        for begin in (0..count).step_by(L) {
-            for lane in 0..L.min(count - begin) {
-                columns.momenta(begin + lane, one);
-                p.iter_mut().skip(lane).step_by(L).zip(&*one).for_each(|(to, from)| *to = *from);
-            }
-            let mut given: [&[f64]; INPUTS] = [&[]; INPUTS];
-            (given[0], given[1]) = (&coordinates[..], &p[..]);
-            given[ARGUMENTS..].iter_mut().zip(&*fields).for_each(|(to, from)| *to = from);
-            // Angles that are too large for several states at once are those of all columns.
-            done = code.call(&given, &mut [&mut v[..], &mut free[..], &mut sigma[..]], &mut self.scratch);
-            if !done {
-                break;
-            }
-            for lane in 0..L.min(count - begin) {
-                one.iter_mut().zip(v.iter().skip(lane).step_by(L)).for_each(|(to, from)| *to = *from);
-                columns.take(begin + lane, one);
-            }
-        }
-        self.several = several;
-        done
-    }
-
-    /// The fields, in the order of their table.
-    fn fields(&self) -> [&[f64]; FIELDS.len()] {
-        let Interpreter { tau, drive_q, drive_v, drive_a, wrenches, gravity, .. } = &self.interpreter;
-        let gravity = if self.sizes().gravity > 0 { &gravity[..] } else { &[] };
-        [tau, drive_q, drive_v, drive_a, wrenches.as_flattened(), self.parameters(), &self.acts, gravity]
-    }
 }
 
 impl<const L: usize> System for CompiledLanes<L> {

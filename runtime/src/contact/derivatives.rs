@@ -78,7 +78,10 @@ impl<Y: Touching> WithContacts<Y> {
         pd: &mut Y::Momenta,
     ) {
         self.rates_at(t, q, p, qd, pd);
-        self.look(t, q, p);
+        // Friction has asked for them already.
+        if !self.rubs {
+            self.free(t, q, p);
+        }
         copy(v.as_mut(), self.at.v.as_ref());
     }
 }

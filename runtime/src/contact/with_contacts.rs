@@ -41,7 +41,7 @@ pub struct WithContacts<Y: Touching> {
     /// Whether it has forces found with the present modes, from which the next ones are searched.
     near: bool,
     /// Whether any contact slides with friction.
-    rubs: bool,
+    pub(super) rubs: bool,
     /// Whether rows of closed contacts depend on one another.
     pub(super) redundant: bool,
     pub(super) at: Contacts<Y>,
@@ -273,10 +273,15 @@ impl<Y: Touching> WithContacts<Y> {
         self.rubs(k) && !self.begins(k)
     }
 
+    /// Speed of slip of contact `k` along the direction that is noted for it, m/s, after [`WithContacts::look`].
+    pub(super) fn along_slip(&self, k: usize) -> Y::Scalar {
+        let ([x, y], [a, b]) = (self.tangential(k), self.slip_of(k));
+        x * a + y * b
+    }
+
     /// Whether contact `k` slides against the direction of slip that is noted for it, after [`WithContacts::look`].
     pub(super) fn is_turned(&self, k: usize) -> bool {
-        let ([x, y], [a, b]) = (self.tangential(k), self.slip_of(k));
-        self.slides_on(k) && x * a + y * b < Y::Scalar::zero()
+        self.slides_on(k) && self.along_slip(k) < Y::Scalar::zero()
     }
 
     /// Direction of slip of contact `k` after [`WithContacts::look`]. Beyond the end of the motion along the direction
@@ -290,7 +295,7 @@ impl<Y: Touching> WithContacts<Y> {
         if !(speed.to_f64() > SLOW) {
             return [a, b];
         }
-        let along = x * a + y * b;
+        let along = self.along_slip(k);
         let back = if along < Y::Scalar::zero() { along + along } else { Y::Scalar::zero() };
         [(x - back * a) / speed, (y - back * b) / speed]
     }

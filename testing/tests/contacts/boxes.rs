@@ -7,9 +7,8 @@ use std::time::Instant;
 use mbd_codegen::model::Model;
 use mbd_codegen::options::{Arithmetic, Options};
 use mbd_codegen::plan::Plan;
-use mbd_runtime::contact::{HybridError, Mode, Touching, Way};
+use mbd_runtime::contact::{HybridError, Mode, Way};
 use mbd_runtime::spatial::{add3, dot3, scale3, Vec3};
-use mbd_runtime::Constrained;
 use mbd_testing::nearest::segments;
 use mbd_testing::random::Rng;
 
@@ -139,9 +138,7 @@ fn pair([a, b]: [&Solid; 2], names: [&str; 2]) -> Model {
 
 /// Gaps of all contacts and the rates of their rows.
 fn all(scene: &mut Scene, q: &[f64], v: &[f64]) -> Vec<(f64, [f64; 3])> {
-    let system = scene.system.system_mut();
-    let (mut gaps, mut rates, mut entries) = (system.zero_rows(), system.zero_rows(), system.zero_entries());
-    system.gaps(0.0, &q.to_vec(), &v.to_vec(), &mut gaps, &mut rates, &mut entries);
+    let [gaps, rates] = scene.rows_at(q, v);
     gaps.chunks(3).zip(rates.chunks(3)).map(|(gap, rate)| (gap[0], [rate[0], rate[1], rate[2]])).collect()
 }
 

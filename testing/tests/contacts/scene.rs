@@ -96,11 +96,16 @@ impl Scene {
 
     /// Residuals of all rows; those of normal rows are gaps, m.
     pub fn gaps(&mut self) -> Vec<f64> {
-        let v = self.v();
+        let (q, v) = (self.q.clone(), self.v());
+        self.rows_at(&q, &v)[0].clone()
+    }
+
+    /// Residuals and velocities of all rows at a state.
+    pub fn rows_at(&mut self, q: &[f64], v: &[f64]) -> [Vec<f64>; 2] {
         let system = self.system.system_mut();
         let (mut gaps, mut rates, mut entries) = (system.zero_rows(), system.zero_rows(), system.zero_entries());
-        system.gaps(0.0, &self.q, &v, &mut gaps, &mut rates, &mut entries);
-        gaps
+        system.gaps(0.0, &q.to_vec(), &v.to_vec(), &mut gaps, &mut rates, &mut entries);
+        [gaps, rates]
     }
 
     /// Kinetic and potential energy, J.

@@ -1,9 +1,8 @@
 //! Gaps and rows of capsules, boxes and cylinders at random places, against searches over all their points.
 
 use mbd_codegen::model::Model;
-use mbd_runtime::contact::Touching;
 use mbd_runtime::spatial::{add3, cross, dot3, scale3, Vec3};
-use mbd_runtime::{Constrained, System};
+use mbd_runtime::System;
 use mbd_testing::random::Rng;
 
 use super::scene::{model, Scene};
@@ -171,17 +170,9 @@ pub(super) struct Rows {
 }
 
 pub(super) fn rows(scene: &mut Scene, q: &[f64], v: &[f64]) -> Rows {
-    let (q, v) = (q.to_vec(), v.to_vec());
-    let system = scene.system.system_mut();
-    let (mut gaps, mut rates, mut entries) = (system.zero_rows(), system.zero_rows(), system.zero_entries());
-    system.gaps(0.0, &q, &v, &mut gaps, &mut rates, &mut entries);
-    let mut row = Vec::new();
-    for k in 0..v.len() {
-        let unit: Vec<f64> = (0..v.len()).map(|j| if j == k { 1.0 } else { 0.0 }).collect();
-        let (mut gaps, mut along, mut entries) = (system.zero_rows(), system.zero_rows(), system.zero_entries());
-        system.gaps(0.0, &q, &unit, &mut gaps, &mut along, &mut entries);
-        row.push(along[0]);
-    }
+    let [gaps, rates] = scene.rows_at(q, v);
+    let unit = |k: usize| -> Vec<f64> { (0..v.len()).map(|j| if j == k { 1.0 } else { 0.0 }).collect() };
+    let row = (0..v.len()).map(|k| scene.rows_at(q, &unit(k))[1][0]).collect();
     Rows { gap: gaps[0], rates: [rates[0], rates[1], rates[2]], row }
 }
 
@@ -206,11 +197,8 @@ pub(super) fn gap_rate(scene: &mut Scene, q: &[f64], v: &[f64]) -> f64 {
 pub(super) fn gap_rate_of(scene: &mut Scene, q: &[f64], v: &[f64], row: usize) -> f64 {
     let h = 1e-5;
     let [ahead, behind] = [h, -h].map(|h| {
-        let (q, v) = (later(scene, q, v, h), v.to_vec());
-        let system = scene.system.system_mut();
-        let (mut gaps, mut rates, mut entries) = (system.zero_rows(), system.zero_rows(), system.zero_entries());
-        system.gaps(0.0, &q, &v, &mut gaps, &mut rates, &mut entries);
-        gaps[row]
+        let q = later(scene, q, v, h);
+        scene.rows_at(&q, v)[0][row]
     });
     (ahead - behind) * 0.5 / h
 }

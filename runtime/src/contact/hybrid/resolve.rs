@@ -106,7 +106,7 @@ where
         self.take_modes(system, t);
         // Each round takes energy; the directions of the last one are noticed by the next step, if they are still wrong.
         for _ in 0..ROUNDS {
-            system.look(t, &self.q, &self.p);
+            // At the state and in the modes that `take_modes` has looked at last.
             if !(0..self.count(system)).any(|k| system.is_turned(k)) {
                 break;
             }

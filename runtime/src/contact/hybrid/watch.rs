@@ -367,7 +367,6 @@ impl<Y: Touching> WithContacts<Y> {
 
     /// The functions of contact `k`, after [`WithContacts::look`] and, if it is closed, [`WithContacts::loads`].
     pub(super) fn watched(&self, k: usize) -> Watched<Y::Scalar> {
-        let zero = Y::Scalar::zero();
         let c = self.contact(k);
         let [normal, x, y] = self.force(k);
         let held = usize::from(!self.is_open());
@@ -377,9 +376,8 @@ impl<Y: Touching> WithContacts<Y> {
                 Watched { first: self.gap(k) + Y::Scalar::constant(OVERLAP[held]), rate: self.gap_rate(k), ..none }
             }
             Mode::Slide => {
-                let ([vx, vy], [a, b]) = (self.tangential(k), self.slip_of(k));
-                let rubs = c.tangents && c.friction > zero;
-                Watched { first: normal, speed: self.speed(k), second: rubs.then_some(vx * a + vy * b), ..none }
+                let second = self.rubs(k).then(|| self.along_slip(k));
+                Watched { first: normal, speed: self.speed(k), second, ..none }
             }
             Mode::Stick => {
                 let tangential = (x * x + y * y).sqrt();
