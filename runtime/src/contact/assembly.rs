@@ -67,6 +67,8 @@ pub struct ColumnsOf<'a, 'b, S> {
     places: &'a [usize],
 }
 
+/// Tables of modes, which need `alloc`, are what asks for it.
+#[cfg(feature = "alloc")]
 impl<'b, S: Real> Columns<'b, S> {
     /// Of a mechanism with such contacts and rows.
     pub(super) fn of<'a>(
