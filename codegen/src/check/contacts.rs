@@ -135,7 +135,7 @@ pub(super) fn between(
             }
         }
     }
-    let every = raw.all_pairs.or(raw.floor.map(|_| Span::FILE));
+    let every = raw.all_pairs.or((!raw.floors.is_empty()).then_some(Span::FILE));
     if let Some(span) = every {
         let neighbours = neighbours(joints, &welded);
         let far = |a: &Shape, b: &Shape| {
@@ -284,7 +284,7 @@ fn all(
     for (j, second) in shapes.iter().enumerate() {
         for (i, first) in shapes[..j].iter().enumerate() {
             let (Some(a), Some(b)) = (first, second) else { continue };
-            let asked = raw.all_pairs.is_some() || raw.floor.is_some_and(|floor| floor == i || floor == j);
+            let asked = raw.all_pairs.is_some() || [i, j].iter().any(|k| raw.floors.contains(k));
             if !asked || listed.contains(&[i, j]) || !far(a, b) {
                 continue;
             }

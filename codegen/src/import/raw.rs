@@ -474,8 +474,8 @@ pub struct RawModel {
     pub all_pairs: Option<Span>,
     /// Descriptions of the same mechanism after changes of its tree, in file order.
     pub variants: Vec<RawVariant>,
-    /// A shape, by its index, that all other shapes can touch, whatever pairs are asked for.
-    pub floor: Option<usize>,
+    /// Shapes, by their indices, that all other shapes can touch, whatever pairs are asked for.
+    pub floors: Vec<usize>,
     /// Whether a body or joint was left out after a finding. Unknown names and bodies without a joint are then not
     /// reported again.
     pub incomplete: bool,
@@ -501,7 +501,7 @@ impl RawModel {
             surface: RawSurface::default(),
             all_pairs: None,
             variants: Vec::new(),
-            floor: None,
+            floors: Vec::new(),
             incomplete: false,
             lenient: false,
         }
