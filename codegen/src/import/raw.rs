@@ -326,6 +326,8 @@ pub struct RawShape {
     pub length: Option<RawNumber>,
     /// Lengths of edges, m.
     pub size: Option<RawVec3>,
+    /// Sides of the prism that a cylinder is.
+    pub sides: Option<RawNumber>,
     /// Radius of edges and corners, m.
     pub rounding: Option<RawNumber>,
     /// Semi-axes of an ellipsoid, m.
@@ -371,6 +373,7 @@ impl RawShape {
             radius: None,
             length: None,
             size: None,
+            sides: None,
             rounding: None,
             semi_axes: None,
             normal: None,
