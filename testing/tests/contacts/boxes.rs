@@ -174,6 +174,9 @@ fn the_least_gap_is_the_distance() {
     println!("{found:?}");
 }
 
+/// The places of two bodies that are nearest to each other, in ground axes.
+pub(super) type Places = [Vec3<f64>; 2];
+
 /// How much gaps, rows and rates differ at most from what is known of them, and how many of all pairs touch at several places.
 #[derive(Debug, Default)]
 pub(super) struct Agreement {
@@ -193,7 +196,7 @@ impl Agreement {
         models: [Model; 2],
         radii: [f64; 2],
         seed: u64,
-        nearest: &dyn Fn(&[f64]) -> Option<[Vec3<f64>; 2]>,
+        nearest: &dyn Fn(&[f64]) -> Option<Places>,
     ) {
         let [mut scene, mut swapped] = models.map(|model| Scene::new(model, &[0.0; 14], &[0.0; 12]));
         let mut rng = Rng::new(seed, 12);

@@ -98,7 +98,7 @@ impl<'m, 'd> Fields<'m, 'd> {
     fn of_asset(&self, reader: &mut Reader, element: &Element, name: &str) -> Option<RawField> {
         let whose = format!("height field {}: ", quote(name));
         let span = place(element.node);
-        let Some(size) = size(reader, element, &whose) else { return None };
+        let size = size(reader, element, &whose)?;
         let read = match element.attribute("file") {
             Some(file) => self.of_file(element, &file).map(Some),
             None => listed(reader, element, &whose)?,
