@@ -32,6 +32,8 @@ use core::marker::PhantomData;
 const RESIDUAL: f64 = 1e-7;
 /// Overlap in the middle of a step that stays, m (rad for stops of rotations).
 const OVERLAP: f64 = 1e-6;
+/// Relative residual of what takes bodies apart that is enough: what remains is taken away in the next step.
+const ROUGHLY: f64 = 1e-4;
 
 /// What happened in a motion by time steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -376,7 +378,13 @@ where
         touching.problem.as_mut().iter_mut().for_each(|touch| touch.contact.restitution = zero);
         touching.impulses.as_mut().fill(zero);
         let (problem, impulses, work) = touching.parts();
-        I::find(&self.rules, &problem, impulses, work)
+        let effort = match self.rules.effort {
+            Effort::ToTolerance { tolerance, rounds } => {
+                Effort::ToTolerance { tolerance: tolerance.max(ROUGHLY), rounds }
+            }
+            other => other,
+        };
+        I::find(&ContactRules { effort, ..self.rules }, &problem, impulses, work)
             .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
         let (order, impulses) = (touching.order(), touching.impulses.as_ref());
         system.respond_to_impulses((t, &self.q), order, impulses, self.implicit);
