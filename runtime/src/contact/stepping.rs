@@ -30,10 +30,9 @@ use core::marker::PhantomData;
 
 /// Relative residual of impulses that is enough where that of the rules is not reached: steps err by more.
 const RESIDUAL: f64 = 1e-7;
-/// Overlap in the middle of a step that stays, m (rad for stops of rotations).
-const OVERLAP: f64 = 1e-6;
-/// Relative residual of what takes bodies apart that is enough: what remains is taken away in the next step.
-const ROUGHLY: f64 = 1e-4;
+/// Overlap in the middle of a step that stays, m (rad for stops of rotations), and as a part of what the fastest gap changes by
+/// in the step: what moves fast errs by more.
+const OVERLAP: [f64; 2] = [1e-6, 0.01];
 
 /// What happened in a motion by time steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -136,6 +135,8 @@ pub struct TimeStepping<Y: Touching, B, I = ByRules> {
     pub rules: ContactRules,
     /// What closes loops.
     pub post_step: B,
+    /// Whether overlaps are taken away, where the way in which impulses are found allows it.
+    pub lifts: bool,
     pub(super) chart: Chart<WithContacts<Y>>,
     pub(super) start: Point<WithContacts<Y>>,
     pub(super) point: Point<WithContacts<Y>>,
@@ -154,6 +155,8 @@ pub struct TimeStepping<Y: Touching, B, I = ByRules> {
     pub(super) implicit: bool,
     /// Whether a contact had an impulse in the last step, and whether it has one in this step.
     pressed: [Y::PerContact<bool>; 2],
+    /// What the fastest gap changes by in this step, m (rad for stops of rotations).
+    near: Y::Scalar,
     /// Times of the ends of the last step, s, and the state at its start.
     span: [Y::Scalar; 2],
     last: (Y::Coordinates, Y::Momenta),
@@ -190,6 +193,7 @@ where
         TimeStepping {
             rules: ContactRules::default(),
             post_step,
+            lifts: true,
             chart: Chart::new(system, false),
             start: Point::zero(system),
             point: Point::zero(system),
@@ -203,6 +207,7 @@ where
             v: inner.zero_momenta(),
             implicit: false,
             pressed: [inner.per_contact(false), inner.per_contact(false)],
+            near: Y::Scalar::zero(),
             span: [Y::Scalar::zero(); 2],
             last: (inner.neutral(), inner.zero_momenta()),
             touching: Touches::new(inner),
@@ -245,7 +250,7 @@ where
         self.pressed[1].as_mut().fill(false);
         if self.touching.count > 0 {
             self.collide(system, t + h)?;
-            if I::LIFTS {
+            if I::LIFTS && self.lifts {
                 self.lift(system, t + h, half)?;
             }
             self.drift(system, t + h, half)?;
@@ -281,6 +286,7 @@ where
             }
         });
         let near = half * (fastest + fastest);
+        self.near = near;
         self.touching.count = 0;
         let mut at = 0;
         for k in 0..system.modes().len() {
@@ -366,11 +372,12 @@ where
         let zero = Y::Scalar::zero();
         let Self { touching, .. } = self;
         let rows = touching.rows();
-        let mut overlaps = false;
+        let [all, part] = OVERLAP.map(Y::Scalar::constant);
+        let (least, mut overlaps) = (larger(all, part * self.near), false);
         for i in 0..touching.count {
             let (k, c) = (touching.contact(i), touching.touch(i).contact);
             let gap = system.gap(k) - half * system.gap_rate(k);
-            overlaps |= gap < Y::Scalar::constant(-OVERLAP);
+            overlaps |= gap < -least;
             for row in c.row..c.row + c.rows() {
                 // Velocities after the impulses, and what is ahead.
                 let after = (0..rows).fold(get(touching.b.as_ref(), row), |sum, column| {
@@ -387,13 +394,7 @@ where
         touching.problem.as_mut().iter_mut().for_each(|touch| touch.contact.restitution = zero);
         touching.impulses.as_mut().fill(zero);
         let (problem, impulses, work) = touching.parts();
-        let effort = match self.rules.effort {
-            Effort::ToTolerance { tolerance, rounds } => {
-                Effort::ToTolerance { tolerance: tolerance.max(ROUGHLY), rounds }
-            }
-            other => other,
-        };
-        I::find(&ContactRules { effort, ..self.rules }, &problem, impulses, work)
+        I::find(&self.rules, &problem, impulses, work)
             .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
         let (order, impulses) = (touching.order(), touching.impulses.as_ref());
         system.respond_to_impulses((t, &self.q), order, impulses, self.implicit);
