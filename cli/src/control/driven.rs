@@ -201,6 +201,19 @@ impl Reducible for Driven {
     ) {
         self.inner.gaps(q, v, gaps, velocities, entries);
     }
+    fn sees_parts(&self) -> bool {
+        self.inner.sees_parts()
+    }
+    fn gaps_of(
+        &mut self,
+        wanted: &[bool],
+        state: (&Vec<f64>, &Vec<f64>),
+        gaps: &mut Vec<f64>,
+        velocities: &mut Vec<f64>,
+        entries: &mut Vec<f64>,
+    ) {
+        self.inner.gaps_of(wanted, state, gaps, velocities, entries);
+    }
     fn project_several(&mut self, t: f64, q: &Vec<f64>, of: &mut ColumnsOf<f64>) -> bool {
         self.inner.project_several(t, q, of)
     }
