@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 pub use rank::MassMatrixError;
 
 use crate::sweep::{Derivatives, FrameState, Inputs, Plain, Sweeps};
-use crate::system::{LieGroup, LieJoint, MomentumDerivatives, Row};
+use crate::system::{LieGroup, LieJoint, MomentumDerivatives, Real, Row};
 use crate::tree::{Kind, Source, Tree};
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -312,5 +312,20 @@ impl<S: Scalar> Interpreter<S> {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         let frames = self.tree.frames.iter().zip(out);
         sweeps.frame_states(q, v, &inputs!(self), &mut self.work, frames);
+    }
+}
+
+impl<S: Real> Interpreter<S> {
+    /// The interpreter whose joints have the inertia that a step of `step` s by the implicit midpoint rule adds for springs
+    /// and dampers, with zero inputs and the gravity of this one, and what is added to the inertia of each velocity. `None`
+    /// where no joint has a spring or a damper.
+    pub fn with_implicit_springs(&self, step: S) -> Option<(Self, Vec<S>)> {
+        if !self.physical.has_springs_or_dampers() {
+            return None;
+        }
+        let made = Self::new(self.physical.clone().with_implicit_springs(step), self.gravity);
+        let (rows, entry_columns) = (self.rows.clone(), self.entry_columns.clone());
+        let made = Interpreter { rows, entry_columns, names: self.names.clone(), ..made };
+        Some((made, self.physical.implicit_inertias(step)))
     }
 }

@@ -5,6 +5,7 @@
 //! constant motion subspace `E` in the node frame; rotations are about, and translations along, its z axis.
 
 mod elimination;
+mod implicit;
 mod map;
 pub mod row_order;
 mod unrolled;

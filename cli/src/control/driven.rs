@@ -214,6 +214,10 @@ impl Reducible for Driven {
     ) {
         self.inner.gaps_of(wanted, state, gaps, velocities, entries);
     }
+    fn with_implicit_springs(&self, step: f64) -> Option<(Self, Vec<f64>)> {
+        let (inner, added) = self.inner.with_implicit_springs(step)?;
+        Some((Driven { inner, ..self.clone() }, added))
+    }
     fn project_several(&mut self, t: f64, q: &Vec<f64>, of: &mut ColumnsOf<f64>) -> bool {
         self.inner.project_several(t, q, of)
     }

@@ -77,6 +77,8 @@ pub(super) struct Shared<S> {
     coordinate_rates: OnceLock<Result<MachineCode<S>, CompileError>>,
     /// The same with only some rows of the constraints, by the rows that act.
     reduced: Mutex<BTreeMap<Vec<bool>, Arc<Shared<S>>>>,
+    /// The same for steps that are implicit in springs and dampers.
+    implicit: OnceLock<Arc<Shared<S>>>,
     /// Code for several states at once.
     pub(super) lanes: AllLanes,
 }
@@ -86,7 +88,7 @@ impl<S: Number> Shared<S> {
     fn new(plan: Plan, options: Options, sizes: Sizes) -> Self {
         let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
         let (coordinate_rates, reduced, lanes) = (OnceLock::new(), Mutex::default(), AllLanes::default());
-        Shared { plan, options, sizes, outputs, coordinate_rates, reduced, lanes }
+        Shared { plan, options, sizes, outputs, coordinate_rates, reduced, implicit: OnceLock::new(), lanes }
     }
 
     pub(super) fn sizes(&self) -> &Sizes {
@@ -424,6 +426,16 @@ impl<S: Number> Reducible for Compiled<S> {
         if !self.run(Output::Gaps, [q, v, &[]], &mut [gaps, velocities, entries]) {
             self.interpreter.gaps_of(wanted, (q, v), gaps, velocities, entries);
         }
+    }
+
+    fn with_implicit_springs(&self, step: S) -> Option<(Self, Vec<S>)> {
+        let Shared { plan, options, sizes, implicit, .. } = &*self.shared;
+        let (interpreter, added) = self.interpreter.with_implicit_springs(step)?;
+        let params = [&self.params[..], &[step]].concat();
+        let sizes = Sizes { params: params.len(), ..*sizes };
+        let make = || Arc::new(Shared::new(plan.with_implicit_springs(), options.clone(), sizes));
+        let (shared, calls) = (implicit.get_or_init(make).clone(), vec![0; self.calls.len()]);
+        Some((Compiled { shared, planned: None, interpreter, params, calls, ..self.clone() }, added))
     }
 
     fn project_several(&mut self, t: S, q: &Vec<S>, columns: &mut ColumnsOf<S>) -> bool {

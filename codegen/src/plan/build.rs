@@ -36,6 +36,7 @@ impl Plan {
             notices,
             matrix_depth: 0,
             accelerations: None,
+            step: None,
         };
         plan.wrenches = wrenches(model, &plan.frames);
         shared::share(&mut plan);

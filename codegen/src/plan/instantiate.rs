@@ -7,6 +7,7 @@ use mbd_runtime::{Interpreter, Scalar};
 
 use super::placement::rotation;
 use super::structure::{Plan, PlanBond, PlanConstraint, PlanNode, PoseStep, RowsThatAct};
+use crate::model::Param;
 use crate::model::{Gravity, Value};
 
 /// A number of the model as a scalar.
@@ -73,6 +74,19 @@ impl Plan {
     /// The interpreter with the parameters at their defaults.
     pub fn default_interpreter<S: Scalar>(&self) -> Interpreter<S> {
         self.interpreter(&self.default_params().into_iter().map(S::constant).collect::<Vec<S>>())
+    }
+
+    /// The plan whose inertia includes what a step by the implicit midpoint rule adds for springs and dampers of the joints:
+    /// [`Passive::implicit_inertia`]. The length of the step, s, is one more parameter, the last one.
+    pub fn with_implicit_springs(&self) -> Plan {
+        let mut plan = self.clone();
+        plan.step = Some(plan.model.params.len());
+        plan.model.params.push(Param { name: String::from("step"), default: 0.0 });
+        if let RowsThatAct::Some(of) = &mut plan.acts {
+            of.0 = of.0.with_implicit_springs();
+        }
+        plan.accelerations = plan.accelerations.map(|other| Box::new(other.with_implicit_springs()));
+        plan
     }
 
     /// Gravity of the model at given parameters; zero where it is an input, to be set with every call.
@@ -143,11 +157,14 @@ impl Plan {
         }
         let joint = &self.model.joints[node.joint.0];
         let at = |list: &[Value], k: usize| value(list.get(node.joint.1 + k).copied().unwrap_or(Value::ZERO), params);
-        let passive = (0..kind.nv()).map(|k| Passive {
-            damping: at(&joint.damping, k),
-            stiffness: at(&joint.stiffness, k),
-            rest: at(&joint.rest, k),
-            armature: at(&joint.armature, k),
+        let passive = (0..kind.nv()).map(|k| {
+            let passive = Passive {
+                damping: at(&joint.damping, k),
+                stiffness: at(&joint.stiffness, k),
+                rest: at(&joint.rest, k),
+                armature: at(&joint.armature, k),
+            };
+            self.step.map_or(passive, |step| passive.with_implicit_inertia(params[step]))
         });
         Node {
             parent: node.parent,

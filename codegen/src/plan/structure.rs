@@ -132,6 +132,9 @@ pub struct Plan {
     pub matrix_depth: usize,
     /// The same plan with another elimination for accelerations, if that is cheaper.
     pub accelerations: Option<Box<Plan>>,
+    /// The parameter that is the length of a step, s, where the inertia includes what such a step adds for springs and
+    /// dampers of the joints: [`Plan::with_implicit_springs`].
+    pub step: Option<usize>,
 }
 
 /// Which rows of the constraints of a plan act.

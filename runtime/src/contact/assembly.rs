@@ -151,18 +151,22 @@ impl<Y: Touching> WithContacts<Y> {
     /// the square `a`, for a unit force of each line: the inverse inertia of the contacts, if these are all their rows.
     /// One solve for each line, and one for the velocities of prescribed motions, to which forces add theirs; several at
     /// once where the mechanism can. The velocities along the lines themselves, friction included, go to `own`, which may
-    /// be empty. `open` has [`Mode::Open`] for each contact. After [`WithContacts::look`].
+    /// be empty. `open` has [`Mode::Open`] for each contact. With `implicit`, springs and dampers of the joints follow:
+    /// [`Touching::project_columns_implicitly`]. After [`WithContacts::look`].
     pub(super) fn responses(
         &mut self,
         (t, q): (Y::Scalar, &Y::Coordinates),
         of: Forces<Y::Scalar>,
-        open: &[Mode],
+        (open, implicit): (&[Mode], bool),
         a: &mut [Y::Scalar],
         own: &mut [Y::Scalar],
     ) {
         self.borrow_modes(open);
         let WithContacts { system, at, unit: rest, response, response_v, sigma, .. } = self;
         let mut columns = Columns { of, entries: at.entries.as_ref(), a, own, rest: rest.as_mut() };
+        if implicit {
+            return system.project_columns_implicitly(t, q, &mut columns);
+        }
         if system.project_columns(t, q, &mut columns) {
             return;
         }
@@ -213,15 +217,40 @@ impl<Y: Touching> WithContacts<Y> {
     /// Adds the impulses of some contacts, one number for each of their rows, to the momenta of the state, which are freed
     /// of multipliers.
     pub(super) fn kick(&mut self, contacts: &[usize], impulses: &[Y::Scalar]) {
-        let mut i = 0;
-        for &k in contacts {
-            let c = self.contact(k);
-            for row in c.row..c.row + c.rows() {
-                let (system, entries) = (&self.system, &self.at.entries);
-                add_row(system, entries, row, get(impulses, i), &mut self.p);
-                i += 1;
-            }
+        let WithContacts { system, at, p, .. } = self;
+        add_impulses(system, &at.entries, contacts, impulses, p);
+    }
+
+    /// The same where springs and dampers of the joints follow: [`Touching::project_implicitly`]. The change of the
+    /// velocities is `v`.
+    pub(super) fn kick_implicitly(
+        &mut self,
+        (t, q): (Y::Scalar, &Y::Coordinates),
+        contacts: &[usize],
+        impulses: &[Y::Scalar],
+        v: &mut Y::Momenta,
+    ) {
+        let WithContacts { system, at, p, response, .. } = self;
+        response.as_mut().fill(Y::Scalar::zero());
+        add_impulses(system, &at.entries, contacts, impulses, response);
+        system.project_implicitly(t, q, response, v);
+        for (p, change) in p.as_mut().iter_mut().zip(response.as_ref()) {
+            *p = *p + *change;
         }
+    }
+}
+
+/// Adds the impulses of some contacts, one number for each of their rows, to momenta.
+fn add_impulses<Y: Touching>(
+    system: &Y,
+    entries: &Y::Entries,
+    contacts: &[usize],
+    impulses: &[Y::Scalar],
+    p: &mut Y::Momenta,
+) {
+    let rows = contacts.iter().filter_map(|k| system.contacts().get(*k)).flat_map(|c| c.row..c.row + c.rows());
+    for (row, impulse) in rows.zip(impulses) {
+        add_row(system, entries, row, *impulse, p);
     }
 }
 

@@ -99,12 +99,12 @@ impl<Y: Touching> Touches<Y> {
         }
     }
 
-    /// Inverse inertia of the contacts in the problem.
-    pub fn assemble(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates) {
+    /// Inverse inertia of the contacts in the problem; with `implicit`, for a step in which springs and dampers follow.
+    pub fn assemble(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates, implicit: bool) {
         let rows = self.rows();
         let all = Forces { contacts: first(self.order.as_ref(), self.count), touches: None };
         let a = first_mut(self.a.as_mut(), rows * rows);
-        system.responses((t, q), all, self.open.as_ref(), a, &mut []);
+        system.responses((t, q), all, (self.open.as_ref(), implicit), a, &mut []);
         system.restore();
         symmetrize(a, rows);
     }
@@ -166,7 +166,7 @@ impl<Y: Touching> Touches<Y> {
         effort: Effort,
         near: bool,
     ) -> Result<Certificate<Y::Scalar>, ContactError> {
-        self.assemble(system, t, q);
+        self.assemble(system, t, q, false);
         self.free_accelerations(system, t, q);
         let (problem, forces, work) = self.parts();
         if near {
@@ -196,7 +196,7 @@ impl<Y: Touching> Touches<Y> {
         let shared = Forces { contacts: first(order.as_ref(), *count), touches };
         let n = lines(system.system.contacts(), shared).count();
         let a = first_mut(self.a.as_mut(), n * n);
-        system.responses((t, q), shared, self.open.as_ref(), a, self.own.as_mut());
+        system.responses((t, q), shared, (self.open.as_ref(), false), a, self.own.as_mut());
         system.response_to_multipliers((t, q), shared, self.b.as_mut());
         system.restore();
         self.impulses.as_mut().fill(Y::Scalar::zero());

@@ -6,6 +6,7 @@
 
 mod assembly;
 mod derivatives;
+mod fall;
 mod hybrid;
 mod instant;
 #[cfg(feature = "alloc")]

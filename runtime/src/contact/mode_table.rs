@@ -58,6 +58,13 @@ pub trait Reducible: Constrained<Scalar: Real> + Energetic + Conjugate + Sized {
         self.gaps(q, v, gaps, velocities, entries);
     }
 
+    /// The mechanism for steps of `step` s that are implicit in springs and dampers of the joints, with inputs that are zero,
+    /// and what it adds to the inertia of each velocity: [`Touching::project_implicitly`]. `None` where no joint has a spring
+    /// or a damper, or there is no such evaluator.
+    fn with_implicit_springs(&self, _step: Self::Scalar) -> Option<(Self, Self::Momenta)> {
+        None
+    }
+
     /// [`Constrained::project_momenta`] of several momenta at one state, each with the bits that it has alone. Returns whether
     /// that was done: [`Touching::project_columns`].
     fn project_several(&mut self, _t: Self::Scalar, _q: &Self::Coordinates, _of: &mut ColumnsOf<Self::Scalar>) -> bool {
@@ -80,6 +87,10 @@ impl<S: Real> Reducible for Interpreter<S> {
 
     fn reaches(&self, contacts: &[Contact<S>]) -> Vec<Reach<S>> {
         self.tree().reaches(contacts)
+    }
+
+    fn with_implicit_springs(&self, step: S) -> Option<(Self, Vec<S>)> {
+        Interpreter::with_implicit_springs(self, step)
     }
 
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
@@ -106,7 +117,7 @@ impl<S: Real> Reducible for Interpreter<S> {
 ///
 /// It dereferences to the evaluator that is in use, whose inputs are handed over when modes change.
 #[derive(Clone, Debug)]
-pub struct ModeTable<Y: System> {
+pub struct ModeTable<Y: Constrained> {
     /// All rows act: for gaps.
     full: Y,
     modes: Vec<(Vec<Mode>, Y)>,
@@ -115,6 +126,21 @@ pub struct ModeTable<Y: System> {
     reaches: Vec<Reach<Y::Scalar>>,
     /// The rows of [`Touching::gaps_of`].
     wanted: Vec<bool>,
+    implicit: Option<Implicit<Y>>,
+}
+
+/// A mechanism for time steps that are implicit in springs and dampers, with all contacts open.
+#[derive(Clone, Debug)]
+struct Implicit<Y: Constrained> {
+    /// Length of a step, s.
+    step: Y::Scalar,
+    /// Nothing, where the mechanism has no springs and dampers.
+    evaluator: Option<Y>,
+    /// What is added to the inertia of each velocity.
+    added: Y::Momenta,
+    /// Momenta and velocities that prescribed motions give.
+    rest: [Y::Momenta; 2],
+    sigma: Y::Rows,
 }
 
 /// A mechanism with contacts in the interpreter.
@@ -126,7 +152,8 @@ impl<Y: Reducible> ModeTable<Y> {
         let open = vec![Mode::Open; contacts.len()];
         let first = full.acting(&rows_that_act(full.rows().len(), &contacts, &open));
         let (reaches, wanted) = (full.reaches(&contacts), vec![true; full.rows().len()]);
-        ModeTable { full, modes: vec![(open, first)], current: 0, contacts, reaches, wanted }
+        let current = 0;
+        ModeTable { full, modes: vec![(open, first)], current, contacts, reaches, wanted, implicit: None }
     }
 
     /// The sets of modes that were met, in the order in which they were.
@@ -150,14 +177,14 @@ impl<Y: Reducible> ModeTable<Y> {
     }
 }
 
-impl<Y: System> Deref for ModeTable<Y> {
+impl<Y: Constrained> Deref for ModeTable<Y> {
     type Target = Y;
     fn deref(&self) -> &Y {
         &self.modes[self.current].1
     }
 }
 
-impl<Y: System> DerefMut for ModeTable<Y> {
+impl<Y: Constrained> DerefMut for ModeTable<Y> {
     fn deref_mut(&mut self) -> &mut Y {
         &mut self.modes[self.current].1
     }
@@ -357,5 +384,58 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
         let (rows, entries) = (full.rows(), full.entry_columns());
         let mut of = columns.of(contacts, rows, entries);
         modes[*current].1.project_several(t, q, &mut of)
+    }
+
+    fn steps_implicitly(&mut self, step: Y::Scalar) -> bool {
+        let ModeTable { full, contacts, implicit, .. } = self;
+        if implicit.as_ref().is_none_or(|implicit| implicit.step != step) {
+            // What closes loops goes on to act.
+            let open = full.acting(&rows_that_act(full.rows().len(), contacts, &vec![Mode::Open; contacts.len()]));
+            let (evaluator, added) = open.with_implicit_springs(step).unzip();
+            let zero = || full.zero_momenta();
+            *implicit = Some(Implicit {
+                step,
+                evaluator,
+                added: added.unwrap_or_else(zero),
+                rest: [zero(), zero()],
+                sigma: full.zero_rows(),
+            });
+        }
+        implicit.as_ref().is_some_and(|implicit| implicit.evaluator.is_some())
+    }
+
+    fn project_implicitly(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &mut Y::Momenta, v: &mut Y::Momenta) {
+        let Some(Implicit { evaluator: Some(evaluator), added, rest: [rest_p, rest_v], sigma, .. }) =
+            &mut self.implicit
+        else {
+            return;
+        };
+        let current = &mut self.modes[self.current].1;
+        evaluator.swap_inputs(current);
+        rest_p.as_mut().fill(Scalar::zero());
+        evaluator.project_momenta(t, q, rest_p, rest_v, sigma);
+        evaluator.project_momenta(t, q, p, v, sigma);
+        evaluator.swap_inputs(current);
+        let rest = rest_p.as_ref().iter().zip(rest_v.as_ref()).zip(added.as_ref());
+        for ((p, v), ((rest_p, rest_v), added)) in p.as_mut().iter_mut().zip(v.as_mut()).zip(rest) {
+            *v = *v - *rest_v;
+            *p = (*p - *rest_p) - *added * *v;
+        }
+    }
+
+    fn project_columns_implicitly(&mut self, t: Y::Scalar, q: &Y::Coordinates, columns: &mut Columns<Y::Scalar>) {
+        let ModeTable { full, modes, current, contacts, implicit, .. } = self;
+        let Some(Implicit { evaluator: Some(evaluator), rest: [p, v], sigma, .. }) = implicit else { return };
+        let current = &mut modes[*current].1;
+        evaluator.swap_inputs(current);
+        let mut of = columns.of(contacts, full.rows(), full.entry_columns());
+        if !evaluator.project_several(t, q, &mut of) {
+            for i in 0..of.count() {
+                of.momenta(i, p.as_mut());
+                evaluator.project_momenta(t, q, p, v, sigma);
+                of.take(i, v.as_mut());
+            }
+        }
+        evaluator.swap_inputs(current);
     }
 }

@@ -125,20 +125,22 @@ pub struct TimeStepping<Y: Touching, B, I = ByRules> {
     pub rules: ContactRules,
     /// What closes loops.
     pub post_step: B,
-    chart: Chart<WithContacts<Y>>,
-    start: Point<WithContacts<Y>>,
-    point: Point<WithContacts<Y>>,
-    q: Y::Coordinates,
-    p: Y::Momenta,
-    qd: Y::Coordinates,
-    pd: Y::Momenta,
+    pub(super) chart: Chart<WithContacts<Y>>,
+    pub(super) start: Point<WithContacts<Y>>,
+    pub(super) point: Point<WithContacts<Y>>,
+    pub(super) q: Y::Coordinates,
+    pub(super) p: Y::Momenta,
+    pub(super) qd: Y::Coordinates,
+    pub(super) pd: Y::Momenta,
     /// Whether any contact has restitution; velocities of the rows at the start of the step then.
-    bounces: bool,
-    before: Y::Rows,
+    pub(super) bounces: bool,
+    pub(super) before: Y::Rows,
     /// Impulses of each contact in the last step.
     last_impulses: Y::PerContact<[Y::Scalar; 3]>,
     /// Velocities with which coordinates go on.
-    v: Y::Momenta,
+    pub(super) v: Y::Momenta,
+    /// Whether springs and dampers of the joints are taken implicitly in this step.
+    pub(super) implicit: bool,
     /// Whether a contact had an impulse in the last step, and whether it has one in this step.
     pressed: [Y::PerContact<bool>; 2],
     /// Times of the ends of the last step, s, and the state at its start.
@@ -188,6 +190,7 @@ where
             before: inner.zero_rows(),
             last_impulses: inner.per_contact([Y::Scalar::zero(); 3]),
             v: inner.zero_momenta(),
+            implicit: false,
             pressed: [inner.per_contact(false), inner.per_contact(false)],
             span: [Y::Scalar::zero(); 2],
             last: (inner.neutral(), inner.zero_momenta()),
@@ -230,12 +233,7 @@ where
         self.take(system, half);
         self.pressed[1].as_mut().fill(false);
         if self.touching.count > 0 {
-            copy(self.v.as_mut(), system.at.v.as_ref());
             self.collide(system, t + h)?;
-            system.free(t + h, &self.q, &self.p);
-            for (v, after) in self.v.as_mut().iter_mut().zip(system.at.v.as_ref()) {
-                *v = *after - *v;
-            }
             self.drift(system, t + h, half)?;
         } else {
             self.last_impulses.as_mut().fill([Y::Scalar::zero(); 3]);
@@ -254,76 +252,6 @@ where
         self.statistics.changes += u64::from(last.as_ref() != now.as_ref());
         copy(last.as_mut(), now.as_ref());
         Ok(())
-    }
-
-    /// Goes on from `self.q` and `self.p` for a time with the velocities `self.v`. Momenta of groups are those of the same
-    /// motion there.
-    fn drift(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, time: Y::Scalar) -> Result<(), HybridError> {
-        self.chart.load(system, t.to_f64(), &self.q, &self.p)?;
-        self.displacement(system);
-        let Self { chart, point, q, p, .. } = self;
-        point.scale(time);
-        if let Some(index) = point.not_finite() {
-            return Err(StepError::NotFinite { time: t.to_f64(), index }.into());
-        }
-        chart.state(system, point, q, p);
-        Ok(())
-    }
-
-    /// The end of the step if no contact acts, in `self.q` and `self.p`; where contacts have restitution, velocities of the
-    /// rows at the start, in `self.before`.
-    fn fall(
-        &mut self,
-        system: &mut WithContacts<Y>,
-        t: Y::Scalar,
-        h: Y::Scalar,
-        (q, p): (&Y::Coordinates, &Y::Momenta),
-    ) -> Result<(), HybridError> {
-        let half = Y::Scalar::constant(0.5) * h;
-        copy(self.q.as_mut(), q.as_ref());
-        self.bounces = system.system().contacts().iter().any(|c| c.restitution > Y::Scalar::zero());
-        if system.has_loops() || self.bounces {
-            system.look(t, q, p);
-            copy(self.before.as_mut(), system.at.velocities.as_ref());
-            copy(self.p.as_mut(), system.p.as_ref());
-        } else {
-            // Nothing holds the mechanism between steps.
-            copy(self.p.as_mut(), p.as_ref());
-        }
-        self.chart.load(system, t.to_f64(), &self.q, &self.p)?;
-        self.start.clear();
-        self.rate_at(system, t);
-        let Self { chart, start, point, q, p, .. } = self;
-        point.scale(half);
-        start.copy_from(point);
-        chart.state(system, start, q, p);
-        self.rate_at(system, t + half);
-        let Self { chart, point, q, p, .. } = self;
-        point.scale(h);
-        if let Some(index) = point.not_finite() {
-            return Err(StepError::NotFinite { time: t.to_f64(), index }.into());
-        }
-        chart.state(system, point, q, p);
-        Ok(())
-    }
-
-    /// The rate of the displacement at `self.start`, which leads to `self.q` and `self.p`, in `self.point`.
-    fn rate_at(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar) {
-        let Self { chart, start, point, q, p, qd, pd, .. } = self;
-        system.system.rates_at(t, q, p, qd, pd);
-        copy(point.p.as_mut(), pd.as_ref());
-        chart.rates(system, start, (q, p), qd, point);
-    }
-
-    /// The rate of the coordinates' displacement by the velocities `self.v`, in `self.point`.
-    fn displacement(&mut self, system: &mut WithContacts<Y>) {
-        let Self { chart, start, point, q, p, qd, v, .. } = self;
-        system.system.coordinate_rates(q, v, qd);
-        start.clear();
-        point.clear();
-        chart.rates(system, start, (q, p), qd, point);
-        // The momenta of the motion are those of the place where it goes on.
-        point.p.as_mut().fill(Y::Scalar::zero());
     }
 
     /// Takes the contacts into the problem that would overlap at the end of the step, and those that impulses on others
@@ -364,10 +292,11 @@ where
         }
     }
 
-    /// Adds the impulses to the momenta `self.p` at `self.q`, where the system was looked at.
+    /// Adds the impulses to the momenta `self.p` at `self.q`, where the system was looked at; the change of the velocities
+    /// is in `self.v`.
     fn collide(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar) -> Result<(), HybridError> {
         let touching = &mut self.touching;
-        touching.assemble(system, t, &self.q);
+        touching.assemble(system, t, &self.q, self.implicit);
         // The search begins with the impulses of the last step.
         for (i, k) in first(touching.order.as_ref(), touching.count).iter().enumerate() {
             let (last, c) =
@@ -383,7 +312,18 @@ where
             let row = touch.contact.row;
             sum + get(touching.impulses.as_ref(), row) * (get(touching.b.as_ref(), row) - system.gap_rate(*k))
         });
-        system.kick(touching.order(), touching.impulses.as_ref());
+        if self.implicit {
+            system.kick_implicitly((t, &self.q), touching.order(), touching.impulses.as_ref(), &mut self.v);
+            copy(self.p.as_mut(), system.p.as_ref());
+        } else {
+            copy(self.v.as_mut(), system.at.v.as_ref());
+            system.kick(touching.order(), touching.impulses.as_ref());
+            copy(self.p.as_mut(), system.p.as_ref());
+            system.free(t, &self.q, &self.p);
+            for (v, after) in self.v.as_mut().iter_mut().zip(system.at.v.as_ref()) {
+                *v = *after - *v;
+            }
+        }
         self.last_impulses.as_mut().fill([Y::Scalar::zero(); 3]);
         for (k, touch) in first(touching.order.as_ref(), touching.count).iter().zip(touching.problem.as_ref()) {
             let own = part(touching.impulses.as_ref(), touch.contact.row, touch.contact.rows());
@@ -392,7 +332,6 @@ where
             set(self.last_impulses.as_mut(), *k, impulse);
             set(self.pressed[1].as_mut(), *k, impulse[0] > Y::Scalar::zero());
         }
-        copy(self.p.as_mut(), system.p.as_ref());
         let s = &mut self.statistics;
         s.touched += 1;
         s.limited += u64::from(result.limited.is_some());

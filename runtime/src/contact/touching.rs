@@ -89,6 +89,29 @@ pub trait Touching: Constrained<Scalar: Real> {
     ) -> bool {
         false
     }
+    /// Makes the mechanism ready for [`Touching::project_implicitly`] in steps of `step` s. Returns whether it has springs or
+    /// dampers and can do that.
+    fn steps_implicitly(&mut self, _step: Self::Scalar) -> bool {
+        false
+    }
+    /// Velocities that momenta `p` give in such a step, beyond those of prescribed motions, if springs and dampers of the
+    /// joints follow: `(M + D h/2 + K h²/4) v = p`, with loops closed and contacts open. `p` becomes `M v`.
+    fn project_implicitly(
+        &mut self,
+        _t: Self::Scalar,
+        _q: &Self::Coordinates,
+        _p: &mut Self::Momenta,
+        _v: &mut Self::Momenta,
+    ) {
+    }
+    /// [`Touching::project_columns`] of such velocities.
+    fn project_columns_implicitly(
+        &mut self,
+        _t: Self::Scalar,
+        _q: &Self::Coordinates,
+        _columns: &mut Columns<Self::Scalar>,
+    ) {
+    }
 }
 
 /// Adds row `r` of `Φ` times `factor` to a list of momenta.

@@ -343,6 +343,13 @@ where
         }
     }
 
+    /// Inverse of [`Chart::forces`].
+    pub fn joint_forces(system: &Y, q: &Y::Coordinates, point: &Point<Y>, rates: &mut Y::Momenta) {
+        for group in system.lie_joints() {
+            group.inward(q.as_ref(), group.shift(point.x.as_ref()), rates.as_mut());
+        }
+    }
+
     /// Changes a displacement that leads to the state `from` into one that leads to the state `to` close to it.
     pub fn correct(
         system: &Y,

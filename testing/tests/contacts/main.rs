@@ -12,6 +12,7 @@ mod round;
 mod saltation;
 mod scene;
 mod solid;
+mod springs;
 mod stepping;
 mod stiff;
 mod walker;

@@ -21,16 +21,17 @@ use super::scene::{model, Mechanism, Scene};
 
 type Closing = Projection<WithContacts<Mechanism>>;
 
-struct Stepped<I = ByRules> {
+/// A motion by time steps.
+pub struct Stepped<I = ByRules> {
     system: WithContacts<Mechanism>,
     stepping: TimeStepping<Mechanism, Closing, I>,
     t: f64,
-    q: Vec<f64>,
-    p: Vec<f64>,
+    pub q: Vec<f64>,
+    pub p: Vec<f64>,
 }
 
 impl Stepped {
-    fn new(model: &Model, q: &[f64], v: &[f64]) -> Stepped {
+    pub fn new(model: &Model, q: &[f64], v: &[f64]) -> Stepped {
         Stepped::by(model, (q, v), TimeStepping::new)
     }
 }
@@ -58,13 +59,13 @@ impl<I: StepImpulses> Stepped<I> {
         Stepped { system, stepping, t: 0.0, q, p }
     }
 
-    fn step(&mut self, h: f64) {
+    pub fn step(&mut self, h: f64) {
         self.stepping.step(&mut self.system, self.t, h, &mut self.q, &mut self.p).unwrap();
         self.t += h;
     }
 
     /// Goes on by `n` steps of a time in total, s.
-    fn run(&mut self, time: f64, n: u32) -> &mut Self {
+    pub fn run(&mut self, time: f64, n: u32) -> &mut Self {
         (0..n).for_each(|_| self.step(time / f64::from(n)));
         self
     }
@@ -79,7 +80,8 @@ impl<I: StepImpulses> Stepped<I> {
     }
 }
 
-fn shipped(text: &str) -> (Model, Vec<f64>) {
+/// A model and its start.
+pub fn shipped(text: &str) -> (Model, Vec<f64>) {
     let model = model(text);
     let start = Plan::new(&model, 1e-9).start();
     (model, start)

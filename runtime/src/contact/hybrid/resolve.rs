@@ -162,7 +162,7 @@ where
         }
         let rest = self.mark_settling(system, t);
         let touching = &mut self.touching;
-        touching.assemble(system, t, &self.q);
+        touching.assemble(system, t, &self.q, false);
         let mut i = 0;
         for &k in first(touching.order.as_ref(), touching.count) {
             let c = system.contact(k);
