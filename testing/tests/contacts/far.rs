@@ -423,11 +423,12 @@ body = "a"
         let [(events, end, few), (others, other_end, many)] = runs;
         println!("{name}: {} events, {few} rows of {many}, {:?} {:?}", events.len(), events.last(), others.last());
         assert!(events.len() > 5 && events.len() == others.len(), "{name}: {} {}", events.len(), others.len());
+        // Landings at a millionth of a metre a second have times to 1e-8 s.
         for (a, b) in events.iter().zip(&others) {
-            assert!(a.1 == b.1 && (a.0 - b.0).abs() < 1e-9, "{name}: {a:?} {b:?}");
+            assert!(a.1 == b.1 && (a.0 - b.0).abs() < 1e-7, "{name}: {a:?} {b:?}");
         }
         for (a, b) in end.iter().zip(&other_end) {
-            assert!((a - b).abs() < 1e-9, "{name}: {end:?} {other_end:?}");
+            assert!((a - b).abs() < 1e-8, "{name}: {end:?} {other_end:?}");
         }
         assert!(4 * few < 3 * many, "{name}: {few} {many}");
     }

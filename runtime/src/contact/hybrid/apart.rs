@@ -4,10 +4,14 @@ use super::watch::TURN;
 use super::Hybrid;
 use crate::contact::{Mode, Reach, Touching, WithContacts};
 use crate::integrate::Stepper;
-use crate::lists::{get, set};
+use crate::lists::{copy, get, set};
 use crate::system::Real;
 use crate::Scalar;
 
+/// Numbers of steps over which travel is summed up before it is compared with the reserves, the first that is possible; part
+/// of the largest travel of a joint that others have at least.
+const ALLOWED: [f64; 4] = [256.0, 64.0, 16.0, 4.0];
+const RESTING: f64 = 0.05;
 /// How often gaps are looked at in a step, at least.
 const LOOKS: f64 = 4.0;
 /// Numbers of steps among which [`Hybrid::mind_near`] chooses.
@@ -25,6 +29,8 @@ where
                 *reserve = left.first;
             }
         }
+        self.gone.as_mut().fill(Y::Scalar::zero());
+        self.allowed.as_mut().fill(Y::Scalar::zero());
         self.known = true;
     }
 
@@ -43,11 +49,18 @@ where
     }
 
     /// Whether no contact can have closed within the last step, nor since the gaps were looked at. All contacts are open
-    /// then. Takes the travel of the step off the reserves. `near`: the gaps had to be looked at in the step before.
+    /// then. The travel of the step is taken off the reserves, then or later. `near`: the gaps had to be looked at in the step
+    /// before.
     pub(super) fn stays_apart(&mut self, system: &mut WithContacts<Y>, near: bool) -> bool {
         if !system.is_open() {
             self.travel.as_mut().fill(Y::Scalar::constant(f64::INFINITY));
             return false;
+        }
+        if !near {
+            if self.coasts(system) {
+                return true;
+            }
+            self.settle_travel(system);
         }
         // Where displacements alone tell that gaps have to be looked at, rates at the end are not asked for.
         let apart = [[true, false], [true, true]].into_iter().skip(usize::from(!near)).all(|rates| {
@@ -56,9 +69,51 @@ where
             self.has_reserves(system, true)
         });
         if apart {
-            self.use_up();
+            self.allow_more(system);
         }
         apart
+    }
+
+    /// Whether the joints have not moved by more than is allowed since the reserves were known, with the last step.
+    fn coasts(&mut self, system: &mut WithContacts<Y>) -> bool {
+        let [moved, _] = self.solver.travel(system, [true, true], false);
+        let (gone, moved) = (self.gone.as_mut(), moved.as_ref());
+        let within =
+            gone.iter().zip(moved).zip(self.allowed.as_ref()).all(|((gone, moved), most)| *gone + *moved <= *most);
+        if within {
+            gone.iter_mut().zip(moved).for_each(|(gone, moved)| *gone = *gone + *moved);
+        }
+        within
+    }
+
+    /// Takes what has not been taken yet off the reserves: the travel before the last step.
+    fn settle_travel(&mut self, system: &mut WithContacts<Y>) {
+        // Coordinates were no larger than they are now and by how far they have moved.
+        let [_, size] = self.solver.travel(system, [false, false], self.slides);
+        travels(system.system().reaches(), self.gone.as_ref(), size.as_ref(), self.travel.as_mut());
+        self.use_up();
+        self.gone.as_mut().fill(Y::Scalar::zero());
+    }
+
+    /// After a step in which no contact can have closed: how far the joints may move in all, that step included, before the
+    /// reserves are compared again. They have the sum over some steps like this one, in which joints that rest begin to move.
+    fn allow_more(&mut self, system: &mut WithContacts<Y>) {
+        let zero = Y::Scalar::zero();
+        let [moved, size] = self.solver.travel(system, [true, true], self.slides);
+        copy(self.gone.as_mut(), moved.as_ref());
+        let most = moved.as_ref().iter().fold(zero, |most, x| if *x > most { *x } else { most });
+        for steps in ALLOWED {
+            let (steps, rest) = (Y::Scalar::constant(steps), Y::Scalar::constant(RESTING) * most);
+            for (allowed, moved) in self.allowed.as_mut().iter_mut().zip(self.gone.as_ref()) {
+                *allowed = steps * (*moved + rest);
+            }
+            travels(system.system().reaches(), self.allowed.as_ref(), size.as_ref(), self.travel.as_mut());
+            let mut left = self.reserve.as_ref().iter().zip(self.travel.as_ref()).zip(self.ignored.as_ref());
+            if left.all(|((reserve, travel), ignored)| *ignored || *reserve > *travel) {
+                return;
+            }
+        }
+        self.allowed.as_mut().fill(zero);
     }
 
     /// The travel of the last step with the velocities that were found at its end, after [`WithContacts::look`] there. While

@@ -276,9 +276,14 @@ pub struct Hybrid<Y: Touching, M> {
     end: Y::PerContact<Watched<Y::Scalar>>,
     /// Whether the left end is where the next step starts.
     known: bool,
-    /// What is left of each gap after the travel since it was looked at last, m (rad); travel in the last step.
+    /// What is left of each gap after the travel since it was looked at last, but for that of the joints' moves in `gone`, m
+    /// (rad); travel in the last step.
     reserve: Y::PerContact<Y::Scalar>,
     travel: Y::PerContact<Y::Scalar>,
+    /// How far the joints have moved beyond what was taken off the reserves, and how far they may before these are compared
+    /// again, m or rad.
+    gone: Y::Momenta,
+    allowed: Y::Momenta,
     /// Whether coordinates add to the arms of rotations.
     slides: bool,
     departures: Y::PerContact<Departure<Y::Scalar>>,
@@ -352,6 +357,8 @@ where
             known: false,
             reserve: inner.per_contact(zero),
             travel: inner.per_contact(zero),
+            gone: inner.zero_momenta(),
+            allowed: inner.zero_momenta(),
             slides: inner.reaches().iter().any(|reach| reach.slide != zero),
             departures: inner.per_contact(departure),
             touching: Touches::new(inner),
@@ -453,6 +460,7 @@ where
         if let Some(entry) = self.ignored.as_mut().get_mut(contact) {
             *entry = ignored;
         }
+        self.allowed.as_mut().fill(Y::Scalar::zero());
     }
 
     /// Limits of the work.
