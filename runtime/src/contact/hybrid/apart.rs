@@ -8,9 +8,10 @@ use crate::lists::{copy, get, set};
 use crate::system::Real;
 use crate::Scalar;
 
-/// Numbers of steps over which travel is summed up before it is compared with the reserves, the first that is possible; part
-/// of the largest travel of a joint that others have at least.
-const ALLOWED: [f64; 4] = [256.0, 64.0, 16.0, 4.0];
+/// Number of steps over which travel is summed up at most before it is compared with the reserves; part of the number that
+/// these last, for rounding; part of the largest travel of a joint that others are taken to have at least.
+const MOST_STEPS: f64 = 1000.0;
+const ALMOST: f64 = 0.999;
 const RESTING: f64 = 0.05;
 /// How often gaps are looked at in a step, at least.
 const LOOKS: f64 = 4.0;
@@ -96,24 +97,25 @@ where
     }
 
     /// After a step in which no contact can have closed: how far the joints may move in all, that step included, before the
-    /// reserves are compared again. They have the sum over some steps like this one, in which joints that rest begin to move.
+    /// reserves are compared again. These last for some steps like this one, in which joints that rest begin to move.
     fn allow_more(&mut self, system: &mut WithContacts<Y>) {
-        let zero = Y::Scalar::zero();
+        let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
         let [moved, size] = self.solver.travel(system, [true, true], self.slides);
         copy(self.gone.as_mut(), moved.as_ref());
         let most = moved.as_ref().iter().fold(zero, |most, x| if *x > most { *x } else { most });
-        for steps in ALLOWED {
-            let (steps, rest) = (Y::Scalar::constant(steps), Y::Scalar::constant(RESTING) * most);
-            for (allowed, moved) in self.allowed.as_mut().iter_mut().zip(self.gone.as_ref()) {
-                *allowed = steps * (*moved + rest);
-            }
-            travels(system.system().reaches(), self.allowed.as_ref(), size.as_ref(), self.travel.as_mut());
-            let mut left = self.reserve.as_ref().iter().zip(self.travel.as_ref()).zip(self.ignored.as_ref());
-            if left.all(|((reserve, travel), ignored)| *ignored || *reserve > *travel) {
-                return;
-            }
+        for (allowed, moved) in self.allowed.as_mut().iter_mut().zip(self.gone.as_ref()) {
+            *allowed = *moved + Y::Scalar::constant(RESTING) * most;
         }
-        self.allowed.as_mut().fill(zero);
+        travels(system.system().reaches(), self.allowed.as_ref(), size.as_ref(), self.travel.as_mut());
+        let each = self.reserve.as_ref().iter().zip(self.travel.as_ref()).zip(self.ignored.as_ref());
+        let minded = each.filter(|(_, ignored)| !**ignored).map(|((reserve, travel), _)| *reserve / *travel);
+        let mut steps = minded.fold(Y::Scalar::constant(MOST_STEPS), |least, x| if x >= least { least } else { x });
+        if self.slides && steps > one {
+            // Arms become longer, too: in `n` times the way, a gap changes by `n²` times as much at most.
+            steps = steps.sqrt();
+        }
+        let steps = if steps > one { Y::Scalar::constant(ALMOST) * steps } else { zero };
+        self.allowed.as_mut().iter_mut().for_each(|allowed| *allowed = steps * *allowed);
     }
 
     /// The travel of the last step with the velocities that were found at its end, after [`WithContacts::look`] there. While
