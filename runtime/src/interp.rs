@@ -315,17 +315,31 @@ impl<S: Scalar> Interpreter<S> {
     }
 }
 
+/// A mechanism for steps by the implicit midpoint rule.
+#[derive(Clone, Debug)]
+pub struct ImplicitSprings<Y, P> {
+    /// The mechanism whose joints have the inertia that such a step adds for springs and dampers.
+    pub evaluator: Y,
+    /// What is added to the inertia of each velocity, kg m² or kg.
+    pub added: P,
+    /// Stiffness of springs at each velocity, N m/rad or N/m.
+    pub stiffness: P,
+    /// Whether there are velocities without momenta: of prescribed motions, and of loops that close.
+    pub driven: bool,
+}
+
 impl<S: Real> Interpreter<S> {
-    /// The interpreter whose joints have the inertia that a step of `step` s by the implicit midpoint rule adds for springs
-    /// and dampers, with zero inputs and the gravity of this one, and what is added to the inertia of each velocity. `None`
-    /// where no joint has a spring or a damper.
-    pub fn with_implicit_springs(&self, step: S) -> Option<(Self, Vec<S>)> {
+    /// The mechanism for steps of `step` s that are implicit in springs and dampers of the joints, with zero inputs and the
+    /// gravity of this one. `None` where no joint has a spring or a damper.
+    pub fn with_implicit_springs(&self, step: S) -> Option<ImplicitSprings<Self, Vec<S>>> {
         if !self.physical.has_springs_or_dampers() {
             return None;
         }
         let made = Self::new(self.physical.clone().with_implicit_springs(step), self.gravity);
         let (rows, entry_columns) = (self.rows.clone(), self.entry_columns.clone());
-        let made = Interpreter { rows, entry_columns, names: self.names.clone(), ..made };
-        Some((made, self.physical.implicit_inertias(step)))
+        let evaluator = Interpreter { rows, entry_columns, names: self.names.clone(), ..made };
+        let driven = self.tree.dims.drive_v > 0 || !self.tree.constraints.is_empty();
+        let (added, stiffness) = (self.physical.implicit_inertias(step), self.physical.stiffnesses());
+        Some(ImplicitSprings { evaluator, added, stiffness, driven })
     }
 }

@@ -5,6 +5,7 @@ use std::rc::Rc;
 
 use multibody::codegen::jit::Compiled;
 use multibody::runtime::contact::{ColumnsOf, Contact, Reach, Reducible, Way};
+use multibody::runtime::interp::ImplicitSprings;
 use multibody::runtime::system::{LieJoint, Part, Row};
 use multibody::runtime::{Conjugate, Constrained, Differentiable, Energetic, StateDerivatives, System};
 
@@ -214,9 +215,9 @@ impl Reducible for Driven {
     ) {
         self.inner.gaps_of(wanted, state, gaps, velocities, entries);
     }
-    fn with_implicit_springs(&self, step: f64) -> Option<(Self, Vec<f64>)> {
-        let (inner, added) = self.inner.with_implicit_springs(step)?;
-        Some((Driven { inner, ..self.clone() }, added))
+    fn with_implicit_springs(&self, step: f64) -> Option<ImplicitSprings<Self, Vec<f64>>> {
+        let ImplicitSprings { evaluator, added, stiffness, driven } = self.inner.with_implicit_springs(step)?;
+        Some(ImplicitSprings { evaluator: Driven { inner: evaluator, ..self.clone() }, added, stiffness, driven })
     }
     fn project_several(&mut self, t: f64, q: &Vec<f64>, of: &mut ColumnsOf<f64>) -> bool {
         self.inner.project_several(t, q, of)

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use mbd_runtime::contact::{ColumnsOf, Contact, Reach, Reducible, Way};
+use mbd_runtime::interp::ImplicitSprings;
 use mbd_runtime::tree::row_order::RowProducts;
 use mbd_runtime::Interpreter;
 
@@ -428,14 +429,15 @@ impl<S: Number> Reducible for Compiled<S> {
         }
     }
 
-    fn with_implicit_springs(&self, step: S) -> Option<(Self, Vec<S>)> {
+    fn with_implicit_springs(&self, step: S) -> Option<ImplicitSprings<Self, Vec<S>>> {
         let Shared { plan, options, sizes, implicit, .. } = &*self.shared;
-        let (interpreter, added) = self.interpreter.with_implicit_springs(step)?;
+        let ImplicitSprings { evaluator, added, stiffness, driven } = self.interpreter.with_implicit_springs(step)?;
         let params = [&self.params[..], &[step]].concat();
         let sizes = Sizes { params: params.len(), ..*sizes };
         let make = || Arc::new(Shared::new(plan.with_implicit_springs(), options.clone(), sizes));
         let (shared, calls) = (implicit.get_or_init(make).clone(), vec![0; self.calls.len()]);
-        Some((Compiled { shared, planned: None, interpreter, params, calls, ..self.clone() }, added))
+        let all = Compiled { shared, planned: None, interpreter: evaluator, params, calls, ..self.clone() };
+        Some(ImplicitSprings { evaluator: all, added, stiffness, driven })
     }
 
     fn project_several(&mut self, t: S, q: &Vec<S>, columns: &mut ColumnsOf<S>) -> bool {

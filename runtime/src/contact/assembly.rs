@@ -221,21 +221,26 @@ impl<Y: Touching> WithContacts<Y> {
         add_impulses(system, &at.entries, contacts, impulses, p);
     }
 
-    /// The same where springs and dampers of the joints follow: [`Touching::project_implicitly`]. The change of the
-    /// velocities is `v`.
-    pub(super) fn kick_implicitly(
+    /// What the impulses of some contacts change velocities by, in `self.response_v`; with `implicit`, where springs and
+    /// dampers of the joints follow ([`Touching::project_implicitly`]), with the change of the momenta in `self.response`.
+    pub(super) fn respond_to_impulses(
         &mut self,
         (t, q): (Y::Scalar, &Y::Coordinates),
         contacts: &[usize],
         impulses: &[Y::Scalar],
-        v: &mut Y::Momenta,
+        implicit: bool,
     ) {
-        let WithContacts { system, at, p, response, .. } = self;
+        let WithContacts { system, at, response, response_v, unit: rest, sigma, .. } = self;
         response.as_mut().fill(Y::Scalar::zero());
+        if !implicit {
+            system.project_momenta(t, q, response, rest, sigma);
+            response.as_mut().fill(Y::Scalar::zero());
+        }
         add_impulses(system, &at.entries, contacts, impulses, response);
-        system.project_implicitly(t, q, response, v);
-        for (p, change) in p.as_mut().iter_mut().zip(response.as_ref()) {
-            *p = *p + *change;
+        if implicit {
+            system.project_implicitly(t, q, response, response_v);
+        } else {
+            self.answer_from_rest(t, q);
         }
     }
 }

@@ -56,16 +56,16 @@ where
         }
         self.chart.load(system, t.to_f64(), &self.q, &self.p)?;
         self.start.clear();
-        self.rate_at(system, t);
         if self.implicit {
-            self.middle(system, t, half);
+            self.implicit_rate(system, t, half)?;
         } else {
-            self.point.scale(half);
-            self.start.copy_from(&self.point);
+            self.rate_at(system, t);
+            let Self { chart, start, point, q, p, .. } = self;
+            point.scale(half);
+            start.copy_from(point);
+            chart.state(system, start, q, p);
+            self.rate_at(system, t + half);
         }
-        let Self { chart, start, q, p, .. } = self;
-        chart.state(system, start, q, p);
-        self.rate_at(system, t + half);
         let Self { chart, point, q, p, .. } = self;
         point.scale(h);
         if let Some(index) = point.not_finite() {
@@ -75,36 +75,43 @@ where
         Ok(())
     }
 
-    /// The displacement to the middle of the step, in `self.start`, from the rate in `self.point`: after half a step
-    /// with springs and dampers of the joints taken implicitly, on which the rate there makes the step the implicit midpoint
-    /// rule for them, a Rosenbrock method. The forces are those where the velocities at the start lead in half a step, so
-    /// that springs have the length that they would have without forces.
-    fn middle(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, half: Y::Scalar) {
+    /// The rate in the middle of the step, in `self.point`, by the implicit midpoint rule for springs and dampers of the joints
+    /// and the explicit one for the rest. The middle is where the velocities at the start lead; momenta and springs change on
+    /// from there with the inertia of that place, so that dampers act on the velocities that the momenta have there.
+    fn implicit_rate(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        half: Y::Scalar,
+    ) -> Result<(), HybridError> {
+        system.free(t, &self.q, &self.p);
+        copy(self.v.as_mut(), system.at.v.as_ref());
+        self.displacement(system);
         let Self { chart, start, point, q, p, .. } = self;
         start.copy_from(point);
         start.scale(half);
-        start.p.as_mut().fill(Y::Scalar::zero());
+        if let Some(index) = start.not_finite() {
+            return Err(StepError::NotFinite { time: t.to_f64(), index }.into());
+        }
         chart.state(system, start, q, p);
         self.rate_at(system, t);
-        let Self { chart, start, point, q, p, v, .. } = self;
+        let Self { start, point, q, p, pd, v, .. } = self;
         point.scale(half);
-        start.clear();
-        chart.base(system, q, p);
-        Chart::joint_forces(system, q, start, &mut point.p);
-        system.free(t, q, p);
-        copy(p.as_mut(), point.p.as_ref());
-        system.system.project_implicitly(t, q, p, v);
-        for (v, before) in v.as_mut().iter_mut().zip(system.at.v.as_ref()) {
-            *v = *v + *before;
+        copy(pd.as_mut(), point.p.as_ref());
+        Chart::joint_forces(system, q, start, pd);
+        system.system.project_implicitly(t, q, pd, v);
+        for (p, change) in p.as_mut().iter_mut().zip(pd.as_ref()) {
+            *p = *p + *change;
         }
-        Chart::forces(system, q, start, p);
-        copy(self.pd.as_mut(), p.as_ref());
-        chart.base(system, q, p);
-        self.displacement(system);
-        let Self { start, point, pd, .. } = self;
-        point.scale(half);
-        start.copy_from(point);
-        copy(start.p.as_mut(), pd.as_ref());
+        self.rate_at(system, t + half);
+        let Self { start, point, q, pd, v, .. } = self;
+        pd.as_mut().fill(Y::Scalar::zero());
+        system.system.pull(half, v, pd);
+        Chart::forces(system, q, start, pd);
+        for (rate, force) in point.p.as_mut().iter_mut().zip(pd.as_ref()) {
+            *rate = *rate + *force;
+        }
+        Ok(())
     }
 
     /// The rate of the displacement at `self.start`, which leads to `self.q` and `self.p`, in `self.point`.

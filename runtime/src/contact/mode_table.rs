@@ -6,7 +6,7 @@ use core::ops::{Deref, DerefMut};
 
 use super::assembly::{Columns, ColumnsOf};
 use super::{rows_that_act, Contact, Mode, Reach, Touching, Way};
-use crate::interp::Interpreter;
+use crate::interp::{ImplicitSprings, Interpreter};
 use crate::system::{
     system_within, Conjugate, Constrained, Differentiable, Energetic, LieJoint, Real, Row, StateDerivatives, System,
 };
@@ -58,10 +58,9 @@ pub trait Reducible: Constrained<Scalar: Real> + Energetic + Conjugate + Sized {
         self.gaps(q, v, gaps, velocities, entries);
     }
 
-    /// The mechanism for steps of `step` s that are implicit in springs and dampers of the joints, with inputs that are zero,
-    /// and what it adds to the inertia of each velocity: [`Touching::project_implicitly`]. `None` where no joint has a spring
-    /// or a damper, or there is no such evaluator.
-    fn with_implicit_springs(&self, _step: Self::Scalar) -> Option<(Self, Self::Momenta)> {
+    /// The mechanism for steps of `step` s that are implicit in springs and dampers of the joints, with inputs that are zero:
+    /// [`Touching::project_implicitly`]. `None` where no joint has a spring or a damper, or there is no such evaluator.
+    fn with_implicit_springs(&self, _step: Self::Scalar) -> Option<ImplicitSprings<Self, Self::Momenta>> {
         None
     }
 
@@ -89,7 +88,7 @@ impl<S: Real> Reducible for Interpreter<S> {
         self.tree().reaches(contacts)
     }
 
-    fn with_implicit_springs(&self, step: S) -> Option<(Self, Vec<S>)> {
+    fn with_implicit_springs(&self, step: S) -> Option<ImplicitSprings<Self, Vec<S>>> {
         Interpreter::with_implicit_springs(self, step)
     }
 
@@ -135,9 +134,7 @@ struct Implicit<Y: Constrained> {
     /// Length of a step, s.
     step: Y::Scalar,
     /// Nothing, where the mechanism has no springs and dampers.
-    evaluator: Option<Y>,
-    /// What is added to the inertia of each velocity.
-    added: Y::Momenta,
+    springs: Option<ImplicitSprings<Y, Y::Momenta>>,
     /// Momenta and velocities that prescribed motions give.
     rest: [Y::Momenta; 2],
     sigma: Y::Rows,
@@ -391,41 +388,46 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
         if implicit.as_ref().is_none_or(|implicit| implicit.step != step) {
             // What closes loops goes on to act.
             let open = full.acting(&rows_that_act(full.rows().len(), contacts, &vec![Mode::Open; contacts.len()]));
-            let (evaluator, added) = open.with_implicit_springs(step).unzip();
-            let zero = || full.zero_momenta();
-            *implicit = Some(Implicit {
-                step,
-                evaluator,
-                added: added.unwrap_or_else(zero),
-                rest: [zero(), zero()],
-                sigma: full.zero_rows(),
-            });
+            let springs = open.with_implicit_springs(step);
+            let rest = [full.zero_momenta(), full.zero_momenta()];
+            *implicit = Some(Implicit { step, springs, rest, sigma: full.zero_rows() });
         }
-        implicit.as_ref().is_some_and(|implicit| implicit.evaluator.is_some())
+        implicit.as_ref().is_some_and(|implicit| implicit.springs.is_some())
     }
 
     fn project_implicitly(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &mut Y::Momenta, v: &mut Y::Momenta) {
-        let Some(Implicit { evaluator: Some(evaluator), added, rest: [rest_p, rest_v], sigma, .. }) =
-            &mut self.implicit
-        else {
+        let Some(Implicit { springs: Some(springs), rest: [rest_p, rest_v], sigma, .. }) = &mut self.implicit else {
             return;
         };
+        let ImplicitSprings { evaluator, added, driven, .. } = springs;
         let current = &mut self.modes[self.current].1;
         evaluator.swap_inputs(current);
-        rest_p.as_mut().fill(Scalar::zero());
-        evaluator.project_momenta(t, q, rest_p, rest_v, sigma);
         evaluator.project_momenta(t, q, p, v, sigma);
+        if *driven {
+            rest_p.as_mut().fill(Scalar::zero());
+            evaluator.project_momenta(t, q, rest_p, rest_v, sigma);
+            for (both, rest) in [(&mut *p, rest_p), (&mut *v, rest_v)] {
+                both.as_mut().iter_mut().zip(rest.as_ref()).for_each(|(both, rest)| *both = *both - *rest);
+            }
+        }
         evaluator.swap_inputs(current);
-        let rest = rest_p.as_ref().iter().zip(rest_v.as_ref()).zip(added.as_ref());
-        for ((p, v), ((rest_p, rest_v), added)) in p.as_mut().iter_mut().zip(v.as_mut()).zip(rest) {
-            *v = *v - *rest_v;
-            *p = (*p - *rest_p) - *added * *v;
+        for (p, (v, added)) in p.as_mut().iter_mut().zip(v.as_ref().iter().zip(added.as_ref())) {
+            *p = *p - *added * *v;
+        }
+    }
+
+    fn pull(&self, time: Y::Scalar, v: &Y::Momenta, forces: &mut Y::Momenta) {
+        let Some(Implicit { springs: Some(springs), .. }) = &self.implicit else { return };
+        for (force, (v, stiffness)) in forces.as_mut().iter_mut().zip(v.as_ref().iter().zip(springs.stiffness.as_ref()))
+        {
+            *force = *force - *stiffness * (time * *v);
         }
     }
 
     fn project_columns_implicitly(&mut self, t: Y::Scalar, q: &Y::Coordinates, columns: &mut Columns<Y::Scalar>) {
         let ModeTable { full, modes, current, contacts, implicit, .. } = self;
-        let Some(Implicit { evaluator: Some(evaluator), rest: [p, v], sigma, .. }) = implicit else { return };
+        let Some(Implicit { springs: Some(springs), rest: [p, v], sigma, .. }) = implicit else { return };
+        let ImplicitSprings { evaluator, .. } = springs;
         let current = &mut modes[*current].1;
         evaluator.swap_inputs(current);
         let mut of = columns.of(contacts, full.rows(), full.entry_columns());

@@ -23,13 +23,17 @@ use super::{
 use crate::constrained::PostStep;
 use crate::error::StepError;
 use crate::integrate::{Chart, Point};
-use crate::lists::{copy, first, get, get_or, part, part_mut, set};
+use crate::lists::{copy, first, first_mut, get, get_or, part, part_mut, set};
 use crate::system::Real;
 use crate::Scalar;
 use core::marker::PhantomData;
 
 /// Relative residual of impulses that is enough where that of the rules is not reached: steps err by more.
 const RESIDUAL: f64 = 1e-7;
+/// Overlap in the middle of a step that stays, m (rad for stops of rotations).
+const OVERLAP: f64 = 1e-6;
+/// Relative residual of what takes bodies apart that is enough: what remains is taken away in the next step.
+const ROUGHLY: f64 = 1e-4;
 
 /// What happened in a motion by time steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -234,6 +238,7 @@ where
         self.pressed[1].as_mut().fill(false);
         if self.touching.count > 0 {
             self.collide(system, t + h)?;
+            self.lift(system, t + h, half)?;
             self.drift(system, t + h, half)?;
         } else {
             self.last_impulses.as_mut().fill([Y::Scalar::zero(); 3]);
@@ -313,8 +318,13 @@ where
             sum + get(touching.impulses.as_ref(), row) * (get(touching.b.as_ref(), row) - system.gap_rate(*k))
         });
         if self.implicit {
-            system.kick_implicitly((t, &self.q), touching.order(), touching.impulses.as_ref(), &mut self.v);
-            copy(self.p.as_mut(), system.p.as_ref());
+            system.respond_to_impulses((t, &self.q), touching.order(), touching.impulses.as_ref(), true);
+            copy(self.v.as_mut(), system.response_v.as_ref());
+            for (p, (before, more)) in
+                self.p.as_mut().iter_mut().zip(system.p.as_ref().iter().zip(system.response.as_ref()))
+            {
+                *p = *before + *more;
+            }
         } else {
             copy(self.v.as_mut(), system.at.v.as_ref());
             system.kick(touching.order(), touching.impulses.as_ref());
@@ -338,6 +348,49 @@ where
         s.most = s.most.max(touching.count as u32);
         s.lost = s.lost - (result.energy - shift);
         s.residual = larger(s.residual, result.certificate.residual);
+        Ok(())
+    }
+
+    /// Takes bodies apart that would overlap at the end of the step, by velocities of the coordinates alone, which are added
+    /// to `self.v`: momenta stay as they are.
+    fn lift(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, half: Y::Scalar) -> Result<(), HybridError> {
+        let zero = Y::Scalar::zero();
+        let Self { touching, .. } = self;
+        let rows = touching.rows();
+        let mut overlaps = false;
+        for i in 0..touching.count {
+            let (k, c) = (touching.contact(i), touching.touch(i).contact);
+            let gap = system.gap(k) - half * system.gap_rate(k);
+            overlaps |= gap < Y::Scalar::constant(-OVERLAP);
+            for row in c.row..c.row + c.rows() {
+                // Velocities after the impulses, and what is ahead.
+                let after = (0..rows).fold(get(touching.b.as_ref(), row), |sum, column| {
+                    sum + get(touching.a.as_ref(), row * rows + column) * get(touching.impulses.as_ref(), column)
+                });
+                let ahead = if gap < zero { gap / half } else { zero };
+                set(touching.work.as_mut(), row, if row == c.row { after + ahead } else { zero });
+            }
+        }
+        if !overlaps {
+            return Ok(());
+        }
+        copy(first_mut(touching.b.as_mut(), rows), touching.work.as_ref());
+        touching.problem.as_mut().iter_mut().for_each(|touch| touch.contact.restitution = zero);
+        touching.impulses.as_mut().fill(zero);
+        let (problem, impulses, work) = touching.parts();
+        let effort = match self.rules.effort {
+            Effort::ToTolerance { tolerance, rounds } => {
+                Effort::ToTolerance { tolerance: tolerance.max(ROUGHLY), rounds }
+            }
+            other => other,
+        };
+        I::find(&ContactRules { effort, ..self.rules }, &problem, impulses, work)
+            .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
+        let (order, impulses) = (touching.order(), touching.impulses.as_ref());
+        system.respond_to_impulses((t, &self.q), order, impulses, self.implicit);
+        for (v, more) in self.v.as_mut().iter_mut().zip(system.response_v.as_ref()) {
+            *v = *v + *more;
+        }
         Ok(())
     }
 }

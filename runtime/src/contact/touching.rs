@@ -104,6 +104,8 @@ pub trait Touching: Constrained<Scalar: Real> {
         _v: &mut Self::Momenta,
     ) {
     }
+    /// Adds the forces of springs that velocities `v` have stretched for `time` s.
+    fn pull(&self, _time: Self::Scalar, _v: &Self::Momenta, _forces: &mut Self::Momenta) {}
     /// [`Touching::project_columns`] of such velocities.
     fn project_columns_implicitly(
         &mut self,

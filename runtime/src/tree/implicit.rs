@@ -45,11 +45,21 @@ impl<S: Scalar> Tree<S> {
 
     /// What [`Tree::with_implicit_springs`] adds to the diagonal of the inertia, for each velocity.
     pub fn implicit_inertias(&self, step: S) -> Vec<S> {
+        self.by_velocity(|passive| passive.implicit_inertia(step))
+    }
+
+    /// Stiffness of the springs at each velocity, N m/rad or N/m.
+    pub fn stiffnesses(&self) -> Vec<S> {
+        self.by_velocity(|passive| passive.stiffness)
+    }
+
+    /// Sum over the nodes that each velocity moves.
+    fn by_velocity(&self, of: impl Fn(&Passive<S>) -> S) -> Vec<S> {
         let mut all = vec![S::zero(); self.dims.nv];
         for node in &self.nodes {
             let Source::State { v, .. } = node.source else { continue };
             for (sum, passive) in all[v..].iter_mut().zip(&node.passive) {
-                *sum = *sum + node.ratio * node.ratio * passive.implicit_inertia(step);
+                *sum = *sum + node.ratio * node.ratio * of(passive);
             }
         }
         all
