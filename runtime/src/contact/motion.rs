@@ -349,9 +349,10 @@ where
         observer: &mut impl ContactObserver<Y>,
     ) -> Result<Option<RegimeReason>, HybridError> {
         let (left, step) = (t_end - self.t, Y::Scalar::constant(self.rules.step));
-        // A remainder that is rounding only belongs to the last step.
-        let last = !((left / step).to_f64() > 1.0 + 1e-9);
-        let h = if last { left } else { step };
+        // A remainder that is rounding only belongs to the last step, and steps that differ by rounding only are the same.
+        let parts = (left / step).to_f64();
+        let last = !(parts > 1.0 + 1e-9);
+        let h = if last && !(parts > 1.0 - 1e-9) { left } else { step };
         self.steps.step(system, self.t, h, &mut self.q, &mut self.p)?;
         observer.stretch(system, &mut self.steps.last_step(&self.q, &self.p));
         self.t = if last { t_end } else { self.t + h };
