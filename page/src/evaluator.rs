@@ -1,7 +1,7 @@
 //! A mechanism in exact arithmetic: WebAssembly that is assembled for it in the page, the interpreter where there is none.
 //! Both give the same bits.
 
-use std::cell::RefCell;
+use std::cell::{OnceCell, RefCell};
 use std::rc::Rc;
 
 use multibody::codegen::options::{Arithmetic, Options};
@@ -9,6 +9,7 @@ use multibody::codegen::plan::Plan;
 use multibody::codegen::wasm::{place, PlacedArray};
 use multibody::codegen::Output;
 use multibody::runtime::contact::{Contact, Reach, Reducible, Way};
+use multibody::runtime::interp::ImplicitSprings;
 use multibody::runtime::system::{LieJoint, Part, Row};
 use multibody::runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
 
@@ -38,6 +39,8 @@ struct Code {
     plan: Plan,
     /// One for each of [`Output::ALL`].
     functions: RefCell<Vec<Made>>,
+    /// That for steps that are implicit in springs and dampers.
+    implicit: OnceCell<Rc<Code>>,
 }
 
 #[derive(Clone, Debug)]
@@ -128,7 +131,8 @@ impl Function {
 
 impl Code {
     fn new(plan: Plan) -> Rc<Code> {
-        Rc::new(Code { plan, functions: RefCell::new(vec![Made::Calls(0); Output::ALL.len()]) })
+        let functions = RefCell::new(vec![Made::Calls(0); Output::ALL.len()]);
+        Rc::new(Code { plan, functions, implicit: OnceCell::new() })
     }
 
     /// The function of an output, if it has been called often enough.
@@ -300,6 +304,12 @@ impl Reducible for Evaluator {
     }
     fn reaches(&self, contacts: &[Contact<f64>]) -> Vec<Reach<f64>> {
         self.interpreter.tree().reaches(contacts)
+    }
+    fn with_implicit_springs(&self, step: f64) -> Option<ImplicitSprings<Self, Vec<f64>>> {
+        let found = self.interpreter.with_implicit_springs(step)?;
+        let code = self.code.implicit.get_or_init(|| Code::new(self.code.plan.with_implicit_springs())).clone();
+        let params = [&self.params[..], &[step]].concat();
+        Some(found.map(|interpreter| Evaluator { code, interpreter, params, ..self.clone() }))
     }
     fn gaps(
         &mut self,

@@ -328,6 +328,14 @@ pub struct ImplicitSprings<Y, P> {
     pub driven: bool,
 }
 
+impl<Y, P> ImplicitSprings<Y, P> {
+    /// The same with another evaluator.
+    pub fn map<Z>(self, of: impl FnOnce(Y) -> Z) -> ImplicitSprings<Z, P> {
+        let ImplicitSprings { evaluator, added, stiffness, driven } = self;
+        ImplicitSprings { evaluator: of(evaluator), added, stiffness, driven }
+    }
+}
+
 impl<S: Real> Interpreter<S> {
     /// The mechanism for steps of `step` s that are implicit in springs and dampers of the joints, with zero inputs and the
     /// gravity of this one. `None` where no joint has a spring or a damper.

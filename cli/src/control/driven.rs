@@ -216,8 +216,8 @@ impl Reducible for Driven {
         self.inner.gaps_of(wanted, state, gaps, velocities, entries);
     }
     fn with_implicit_springs(&self, step: f64) -> Option<ImplicitSprings<Self, Vec<f64>>> {
-        let ImplicitSprings { evaluator, added, stiffness, driven } = self.inner.with_implicit_springs(step)?;
-        Some(ImplicitSprings { evaluator: Driven { inner: evaluator, ..self.clone() }, added, stiffness, driven })
+        let found = self.inner.with_implicit_springs(step)?;
+        Some(found.map(|inner| Driven { inner, ..self.clone() }))
     }
     fn project_several(&mut self, t: f64, q: &Vec<f64>, of: &mut ColumnsOf<f64>) -> bool {
         self.inner.project_several(t, q, of)

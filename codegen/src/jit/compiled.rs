@@ -430,14 +430,13 @@ impl<S: Number> Reducible for Compiled<S> {
     }
 
     fn with_implicit_springs(&self, step: S) -> Option<ImplicitSprings<Self, Vec<S>>> {
+        let found = self.interpreter.with_implicit_springs(step)?;
         let Shared { plan, options, sizes, implicit, .. } = &*self.shared;
-        let ImplicitSprings { evaluator, added, stiffness, driven } = self.interpreter.with_implicit_springs(step)?;
         let params = [&self.params[..], &[step]].concat();
         let sizes = Sizes { params: params.len(), ..*sizes };
         let make = || Arc::new(Shared::new(plan.with_implicit_springs(), options.clone(), sizes));
         let (shared, calls) = (implicit.get_or_init(make).clone(), vec![0; self.calls.len()]);
-        let all = Compiled { shared, planned: None, interpreter: evaluator, params, calls, ..self.clone() };
-        Some(ImplicitSprings { evaluator: all, added, stiffness, driven })
+        Some(found.map(|interpreter| Compiled { shared, planned: None, interpreter, params, calls, ..self.clone() }))
     }
 
     fn project_several(&mut self, t: S, q: &Vec<S>, columns: &mut ColumnsOf<S>) -> bool {

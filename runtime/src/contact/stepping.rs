@@ -67,6 +67,9 @@ impl<S: Real> SteppingStatistics<S> {
 
 /// How the impulses of a time step are found.
 pub trait StepImpulses {
+    /// Whether overlaps are taken away, for which impulses are found a second time in a step.
+    const LIFTS: bool;
+
     /// The impulses of a problem, as [`impact`]; `impulses` has those of the last step.
     ///
     /// # Errors
@@ -84,6 +87,8 @@ pub trait StepImpulses {
 pub struct ByRules;
 
 impl StepImpulses for ByRules {
+    const LIFTS: bool = true;
+
     fn find<S: Real>(
         rules: &ContactRules,
         problem: &Problem<S>,
@@ -103,12 +108,14 @@ impl StepImpulses for ByRules {
 }
 
 /// By exactly `N` sweeps over the contacts, all of which act at once, whatever the residual is and the rules say: for
-/// processors with a fixed time budget. Nothing is allocated, and numbers stay in the precision of the system. A single
+/// processors with a fixed time budget, so that overlaps stay. Nothing is allocated, and numbers stay in the precision of the system. A single
 /// contact with restitution has the impulses of several: of compression, then of expansion.
 #[derive(Clone, Copy, Debug)]
 pub struct FixedSweeps<const N: u32>;
 
 impl<const N: u32> StepImpulses for FixedSweeps<N> {
+    const LIFTS: bool = false;
+
     fn find<S: Real>(
         _: &ContactRules,
         problem: &Problem<S>,
@@ -238,7 +245,9 @@ where
         self.pressed[1].as_mut().fill(false);
         if self.touching.count > 0 {
             self.collide(system, t + h)?;
-            self.lift(system, t + h, half)?;
+            if I::LIFTS {
+                self.lift(system, t + h, half)?;
+            }
             self.drift(system, t + h, half)?;
         } else {
             self.last_impulses.as_mut().fill([Y::Scalar::zero(); 3]);
