@@ -83,7 +83,7 @@ fn shapes(scene: &Scene, colours: &[usize], frame: &dyn Fn(Option<usize>) -> Str
         let dims = match &shape.kind {
             ShapeKind::Point => return None,
             ShapeKind::Sphere { radius } => vec![*radius],
-            ShapeKind::Capsule { radius, length } | ShapeKind::Cylinder { radius, length } => vec![*radius, *length],
+            ShapeKind::Capsule { radius, length } | ShapeKind::Cylinder { radius, length, .. } => vec![*radius, *length],
             ShapeKind::Box { size, .. } => size.to_vec(),
             ShapeKind::Ellipsoid { semi_axes } => semi_axes.to_vec(),
             ShapeKind::Plane { normal } => normal.to_vec(),

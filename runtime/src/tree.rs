@@ -327,6 +327,15 @@ pub enum Closure<S> {
         /// Radius of the ball, m.
         radius: S,
     },
+    /// A capsule about z of the second frame, with its middle at the origin, rolls on a cylinder about z of the first. Where
+    /// its length is zero, it is a ball.
+    #[cfg(feature = "hulls")]
+    RollingCapsuleOnCylinder {
+        /// Lengths of the cylinder and of the straight part of the capsule, m.
+        lengths: [S; 2],
+        /// Radii of the cylinder and the capsule, m.
+        radii: [S; 2],
+    },
     /// A ball about the second origin rolls on a cylinder about z of the first frame, with its middle at the origin.
     RollingBallOnCylinder {
         /// Length of the cylinder, m.

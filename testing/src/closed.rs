@@ -484,7 +484,9 @@ impl Closer<'_> {
                 let (length, flat) = (num(length), self.distribution.planar);
                 (turn, touching::on_cylinder(&mut self.rng, axis, length, radii.map(num), flat))
             }
-            LoopKind::RollingBallOnField { .. } | LoopKind::RollingBallOnHull { .. } => {
+            LoopKind::RollingBallOnField { .. }
+            | LoopKind::RollingBallOnHull { .. }
+            | LoopKind::RollingCapsuleOnCylinder { .. } => {
                 unreachable!("loops are of the kinds that models can have")
             }
             LoopKind::KnifeEdge { .. } | LoopKind::Pfaffian { .. } => {

@@ -144,7 +144,9 @@ pub fn residuals<S: Real>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose
             .map(|(nearest, [p, q])| length(nearest.apart) - S::constant(p) - S::constant(q))
             .into_iter()
             .collect(),
-        LoopKind::RollingBallOnField { .. } | LoopKind::RollingBallOnHull { .. } => {
+        LoopKind::RollingBallOnField { .. }
+        | LoopKind::RollingBallOnHull { .. }
+        | LoopKind::RollingCapsuleOnCylinder { .. } => {
             unreachable!("tests of height fields and hulls have references of their own")
         }
         LoopKind::KnifeEdge { .. } | LoopKind::Pfaffian { .. } => Vec::new(),
@@ -221,7 +223,9 @@ pub fn rates<S: Real>(kind: &LoopKind, params: &[f64], a: &Pose<S>, b: &Pose<S>)
                 meeting(apart, add3(v, cross(w, add3(arm, back))))
             })
             .unwrap_or_default(),
-        LoopKind::RollingBallOnField { .. } | LoopKind::RollingBallOnHull { .. } => {
+        LoopKind::RollingBallOnField { .. }
+        | LoopKind::RollingBallOnHull { .. }
+        | LoopKind::RollingCapsuleOnCylinder { .. } => {
             unreachable!("tests of height fields and hulls have references of their own")
         }
         LoopKind::KnifeEdge { axis } => vec![dot3(b.direction(unit(axis)), v)],

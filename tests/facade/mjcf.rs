@@ -50,6 +50,68 @@ fn models_of_gymnasium_and_dm_control() {
     assert!(right >= 36, "{right} files are read");
 }
 
+/// Height fields stand where MuJoCo's do, with its heights: those of the model, whose first row is at the greatest y, and those
+/// of a file, whose first row is at the least.
+#[test]
+fn height_fields_are_those_of_mujoco() {
+    use multibody::codegen::model::{Rotation, ShapeKind};
+
+    let folder = format!("{}/tests/reference/mjcf/hfield", env!("CARGO_MANIFEST_DIR"));
+    let text = |file: &str| std::fs::read_to_string(format!("{folder}/{file}")).expect("a file");
+    let data: Value = serde_json::from_str(&text("data.json")).expect("JSON");
+    let path = format!("{folder}/hills.xml");
+    let model = read::model(&path, &text("hills.xml"), &ImportOptions::default()).expect("a model").model;
+    let mut worst = 0.0_f64;
+    for field in data["fields"].as_array().expect("fields") {
+        let shape = model.shapes.iter().find(|shape| shape.name == field["name"]).expect("a shape");
+        let ShapeKind::HeightField { heights, field: surface } = &shape.kind else { panic!("no height field") };
+        assert_eq!(
+            field["rows"].as_u64().zip(field["columns"].as_u64()),
+            Some((heights.len() as u64, heights[0].len() as u64))
+        );
+        assert_eq!(heights.concat(), numbers(&field["heights"]), "{}", shape.name);
+        // The second field stands on a body that nothing moves.
+        let mut mounts = vec![shape.mount.placement];
+        mounts.extend(
+            shape
+                .mount
+                .body
+                .map(|body| model.joints.iter().find(|joint| joint.child == body).expect("a joint").placement),
+        );
+        let value = |x: multibody::codegen::model::Value| x.constant().expect("a constant");
+        let world = |mut point: [f64; 3]| {
+            for placement in &mounts {
+                let Rotation::AxisAngle { axis, angle } = placement.rotation else { panic!("no axis and angle") };
+                let (size, angle) = (axis.iter().map(|x| x * x).sum::<f64>().sqrt(), value(angle));
+                let n = axis.map(|x| x / size);
+                let along: f64 = n.iter().zip(point).map(|(n, x)| n * x).sum();
+                let across = [
+                    n[1] * point[2] - n[2] * point[1],
+                    n[2] * point[0] - n[0] * point[2],
+                    n[0] * point[1] - n[1] * point[0],
+                ];
+                let turned =
+                    |k: usize| along * n[k] + (point[k] - along * n[k]) * angle.cos() + across[k] * angle.sin();
+                point = [0, 1, 2].map(|k| turned(k) + value(placement.xyz[k]));
+            }
+            point
+        };
+        let points = field["points"].as_array().expect("points");
+        let count = |axis: usize| if axis == 0 { heights[0].len() } else { heights.len() };
+        let at = |k: usize, axis: usize| (k as f64 - 0.5 * (count(axis) - 1) as f64) * surface.spacing[axis];
+        for (k, wanted) in points.iter().enumerate() {
+            let (x, y) = (at(k % count(0), 0), at(k / count(0), 1));
+            let point = world([x, y, surface.at([x, y]).height]);
+            for (got, wanted) in point.iter().zip(numbers(wanted)) {
+                worst = worst.max((got - wanted).abs());
+            }
+        }
+    }
+    // Rays pass 1e-10 m beside the corners of triangles, whose slope is below 10.
+    println!("places differ by {worst:.1e} m");
+    assert!(worst < 1e-9, "{worst}");
+}
+
 mod made {
     multibody::mbd_model! {
         mjcf = r#"<mujoco>

@@ -101,7 +101,7 @@ impl Directions {
                 self.hull(&[[0.0, 0.0, 0.5 * length], [0.0, 0.0, -0.5 * length]], radius)
             }
             ShapeKind::Box { size, .. } => cuboid(size),
-            ShapeKind::Cylinder { radius, length } => cylinder(radius, length.max(0.02 * radius)),
+            ShapeKind::Cylinder { radius, length, .. } => cylinder(radius, length.max(0.02 * radius)),
             ShapeKind::Hull { ref points, rounding } => self.hull(points, rounding),
             // Points, planes and height fields.
             _ => Mesh::new(),
@@ -180,7 +180,7 @@ mod tests {
         for (kind, exact) in [
             (ShapeKind::Sphere { radius: 1.0 }, ball),
             (ShapeKind::Box { size: [1.0, 2.0, 3.0], rounding: 0.0 }, 6.0),
-            (ShapeKind::Cylinder { radius: 1.0, length: 2.0 }, 2.0 * std::f64::consts::PI),
+            (ShapeKind::Cylinder { radius: 1.0, length: 2.0, sides: None, rounding: 0.0 }, 2.0 * std::f64::consts::PI),
             (ShapeKind::Capsule { radius: 1.0, length: 2.0 }, ball + 2.0 * std::f64::consts::PI),
             (ShapeKind::Ellipsoid { semi_axes: [1.0, 2.0, 0.5] }, ball),
             (

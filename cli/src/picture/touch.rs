@@ -134,7 +134,7 @@ fn surface(kind: &ShapeKind) -> Vec<[f64; 3]> {
         ShapeKind::Capsule { radius, length } => {
             [-0.5, 0.5].into_iter().flat_map(|end| ellipsoid([0.0, 0.0, end * length], [radius; 3])).collect()
         }
-        ShapeKind::Cylinder { radius, length } => {
+        ShapeKind::Cylinder { radius, length, .. } => {
             let rim = |z: f64| ellipsoid([0.0, 0.0, z], [radius, radius, 0.0]);
             [-0.5, 0.5].into_iter().flat_map(|end| rim(end * length)).collect()
         }

@@ -235,7 +235,7 @@ impl Document {
             let at = |frames: &[FrameState<f64>]| ends.map(|(frame, p)| shapes::placed(frames, frame, p));
             let length = |[a, b]: [[f64; 3]; 2]| (0..3).fold(0.0_f64, |n, k| n.hypot(b[k] - a[k]));
             let longest = all.iter().map(|frames| length(at(frames))).fold(1e-9, f64::max);
-            let rod = ShapeKind::Cylinder { radius: 0.02 * longest, length: 1.0 };
+            let rod = ShapeKind::Cylinder { radius: 0.02 * longest, length: 1.0, sides: None, rounding: 0.0 };
             let mesh = self.mesh(&directions.shape(&rod), Some(colour));
             let node = self.child(0, json!({ "mesh": mesh }));
             let poses = all.iter().map(|frames| {

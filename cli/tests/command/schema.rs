@@ -22,6 +22,7 @@ fn fault(schema: &Value, root: &Value, value: &Value) -> Option<String> {
                 "array" => value.is_array(),
                 "string" => value.is_string(),
                 "number" => value.is_number(),
+                "integer" => value.as_f64().is_some_and(|x| x.fract() == 0.0),
                 "boolean" => value.is_boolean(),
                 other => panic!("type {other}"),
             };
@@ -36,6 +37,8 @@ fn fault(schema: &Value, root: &Value, value: &Value) -> Option<String> {
         "items" => value.as_array()?.iter().find_map(|item| part(stated, item, "item")),
         "minItems" => (value.as_array()?.len() < stated.as_u64()? as usize).then(|| "too short".into()),
         "maxItems" => (value.as_array()?.len() > stated.as_u64()? as usize).then(|| "too long".into()),
+        "minimum" => (value.as_f64()? < stated.as_f64()?).then(|| "too small".into()),
+        "maximum" => (value.as_f64()? > stated.as_f64()?).then(|| "too large".into()),
         "minLength" => (value.as_str()?.len() < stated.as_u64()? as usize).then(|| "empty".into()),
         "required" => {
             let missing = |key: &&Value| value.get(key.as_str().expect("a key")).is_none();

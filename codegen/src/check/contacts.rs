@@ -135,7 +135,7 @@ pub(super) fn between(
             }
         }
     }
-    let every = raw.all_pairs.or(raw.floor.map(|_| Span::FILE));
+    let every = raw.all_pairs.or((!raw.floors.is_empty()).then_some(Span::FILE));
     if let Some(span) = every {
         let neighbours = neighbours(joints, &welded);
         let far = |a: &Shape, b: &Shape| {
@@ -251,13 +251,26 @@ fn unsupported(pair: &Pair, [a, b]: [&Shape; 2], findings: &mut Findings) {
     };
     let solid =
         |s: &Shape| matches!(s.kind, ShapeKind::Capsule { .. } | ShapeKind::Box { .. } | ShapeKind::Hull { .. });
-    let faceless = |s: &Shape| matches!(s.kind, ShapeKind::Hull { .. }) && Rounded::new(&s.kind).is_none();
-    let meets = |s: &Shape| solid(s) || matches!(s.kind, ShapeKind::Point | ShapeKind::Sphere { .. });
+    let cylinder = |s: &Shape| matches!(s.kind, ShapeKind::Cylinder { .. });
+    let bare = |s: &Shape| matches!(s.kind, ShapeKind::Cylinder { sides: None, .. });
+    let faces = |s: &Shape| matches!(s.kind, ShapeKind::Hull { .. }) || cylinder(s);
+    let faceless = |s: &Shape| faces(s) && Rounded::new(&s.kind).is_none();
+    let meets = |s: &Shape| solid(s) || cylinder(s) || matches!(s.kind, ShapeKind::Point | ShapeKind::Sphere { .. });
+    // Without the feature `hulls`, a cylinder touches no capsule either.
+    let rod = |s: &Shape| matches!(s.kind, ShapeKind::Capsule { .. });
+    if let ([true, true], false, Some(without)) =
+        ([a, b].map(|s| solid(s) || cylinder(s)), rod(a) || rod(b), [a, b].into_iter().find(|s| bare(s)))
+    {
+        let message = format!("{message}: {} has no `sides`", quote(&without.name));
+        let help = "add `sides = 12` to it: for what it touches it is then the prism with so many sides, whose corners are on its rims";
+        findings.error(pair.at, message, help);
+        return;
+    }
     let (message, help) = match (Rounded::new(&a.kind), Rounded::new(&b.kind)) {
         (Some(first), Some(second)) if first.contacts(&second) > MOST => {
             let n = first.contacts(&second);
             let message = format!("{what}: corners and edges of both are {n} contacts, more than {MOST}");
-            (message, "give a hull fewer corners by `most`".into())
+            (message, "give a hull fewer corners by `most`, a cylinder fewer `sides`".into())
         }
         (Some(_), Some(_)) => {
             let help = "add `rounding = 0.001` to one of them: the radius of its edges and corners in metres";
@@ -284,7 +297,7 @@ fn all(
     for (j, second) in shapes.iter().enumerate() {
         for (i, first) in shapes[..j].iter().enumerate() {
             let (Some(a), Some(b)) = (first, second) else { continue };
-            let asked = raw.all_pairs.is_some() || raw.floor.is_some_and(|floor| floor == i || floor == j);
+            let asked = raw.all_pairs.is_some() || [i, j].iter().any(|k| raw.floors.contains(k));
             if !asked || listed.contains(&[i, j]) || !far(a, b) {
                 continue;
             }

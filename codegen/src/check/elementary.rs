@@ -15,8 +15,8 @@ use crate::model::{LoopKind, Mount, Placement, ShapeKind, Value};
 /// What [`elementary`] has, for messages.
 pub(super) const SUPPORTED: &str =
     "a `plane` can touch all other kinds but a `height_field`; a `height_field` a `point`, `sphere`, `capsule`, `box` or \
-     `hull`; a `sphere` or `point` all others but an `ellipsoid`, and a `sphere` another one; a `capsule`, `box` or `hull` each \
-     other, of two boxes or hulls where one has a `rounding`";
+     `hull`; a `sphere` or `point` all others but an `ellipsoid`, and a `sphere` another one; a `capsule`, `box`, \
+     `hull` or `cylinder` each other, of two that are no capsules a `cylinder` with `sides`, and one with a `rounding`";
 
 /// One place where two shapes can touch: a loop between two frames, which stand at these origins in the axes of the
 /// shapes, not turned.
@@ -35,7 +35,7 @@ pub(super) struct Elementary {
 /// Most contacts of a pair.
 pub(super) const MOST: usize = 2000;
 
-/// What a capsule, a box or a hull is: all that lies within a radius of its core, which is a line, a box or a polyhedron.
+/// What a capsule, a box, a hull or a cylinder with sides is: all that lies within a radius of its core, which is a line, a box or a polyhedron.
 pub(super) struct Rounded {
     radius: f64,
     core: Core,
@@ -62,7 +62,7 @@ struct Edge {
 }
 
 impl Rounded {
-    /// `None` for shapes of other kinds, and for hulls whose faces are not known.
+    /// `None` for shapes of other kinds, and for hulls whose faces are not known. A cylinder with sides is a prism.
     pub(super) fn new(shape: &ShapeKind) -> Option<Rounded> {
         match *shape {
             ShapeKind::Capsule { radius, length } => {
@@ -80,6 +80,11 @@ impl Rounded {
                     |edge: &mbd_runtime::hull::Edge| Edge { middle: edge.middle, axis: edge.axis, length: edge.length };
                 let edges = hull.edges.iter().map(edge).collect();
                 Some(Rounded { radius: rounding, core: Core::Hull(hull), corners: points.clone(), edges })
+            }
+            #[cfg(feature = "hulls")]
+            ShapeKind::Cylinder { radius, length, sides: Some(sides), rounding } => {
+                let points = rims(radius - rounding, length - 2.0 * rounding, sides);
+                Rounded::new(&ShapeKind::Hull { points, rounding })
             }
             _ => None,
         }
@@ -135,6 +140,19 @@ impl Rounded {
     }
 }
 
+/// Points of the rims of a cylinder, at equal distances from the x axis on: those of the lower one, then those of the upper one.
+#[cfg(feature = "hulls")]
+fn rims(radius: f64, length: f64, sides: usize) -> Vec<[f64; 3]> {
+    let rim = |[_, _, z]: [f64; 3]| {
+        let point = move |k: usize| {
+            let angle = std::f64::consts::TAU * k as f64 / sides as f64;
+            [radius * libm::cos(angle), radius * libm::sin(angle), z]
+        };
+        (0..sides).map(point)
+    };
+    ends(length).into_iter().flat_map(rim).collect()
+}
+
 const MIDDLE: [f64; 3] = [0.0; 3];
 const Z: [f64; 3] = [0.0, 0.0, 1.0];
 
@@ -153,7 +171,7 @@ pub(super) fn elementary(first: &ShapeKind, second: &ShapeKind) -> Option<Vec<El
         (ShapeKind::Plane { normal }, ShapeKind::Hull { points, rounding }) => {
             points.iter().map(|at| ball(*normal, *rounding, *at)).collect()
         }
-        (ShapeKind::Plane { normal }, ShapeKind::Cylinder { radius, length }) => {
+        (ShapeKind::Plane { normal }, ShapeKind::Cylinder { radius, length, .. }) => {
             let kind = LoopKind::RollingDisc { normal: *normal, axis: Z, radius: Value::Const(*radius) };
             ends(*length).into_iter().map(|at| Elementary { second: at, ..middles(kind) }).collect()
         }
@@ -185,10 +203,25 @@ pub(super) fn elementary(first: &ShapeKind, second: &ShapeKind) -> Option<Vec<El
         | (ShapeKind::Capsule { .. }, ShapeKind::Capsule { .. }) => {
             Rounded::new(first)?.meets(&Rounded::new(second)?)?
         }
+        #[cfg(feature = "hulls")]
+        (
+            ShapeKind::Cylinder { radius, length, sides: None, .. },
+            ShapeKind::Capsule { radius: other, length: line },
+        ) => {
+            let ([lengths, radii], axes) = ([[*length, *line], [*radius, *other]].map(|x| x.map(Value::Const)), [Z; 2]);
+            let ball = LoopKind::RollingBallOnCylinder { axis: Z, length: lengths[0], radii };
+            let ends = ends(*line).into_iter().map(|at| Elementary { second: at, ..middles(ball) });
+            ends.chain([middles(LoopKind::RollingCapsuleOnCylinder { axes, lengths, radii })]).collect()
+        }
+        #[cfg(feature = "hulls")]
+        (
+            ShapeKind::Hull { .. } | ShapeKind::Box { .. } | ShapeKind::Capsule { .. } | ShapeKind::Cylinder { .. },
+            ShapeKind::Cylinder { sides: Some(_), .. },
+        ) => Rounded::new(first)?.meets(&Rounded::new(second)?)?,
         (ShapeKind::Hull { .. } | ShapeKind::Box { .. } | ShapeKind::Capsule { .. }, second) => {
             vec![Rounded::new(first)?.ball(ball_of(second)?)]
         }
-        (ShapeKind::Cylinder { radius: first, length }, second) => {
+        (ShapeKind::Cylinder { radius: first, length, .. }, second) => {
             let (length, radii) = (Value::Const(*length), [*first, ball_of(second)?].map(Value::Const));
             vec![middles(LoopKind::RollingBallOnCylinder { axis: Z, length, radii })]
         }
@@ -304,8 +337,8 @@ mod tests {
         assert_eq!(count(ShapeKind::Sphere { radius }), Some(1));
         assert_eq!(count(ShapeKind::Capsule { radius, length }), Some(2));
         assert_eq!(count(ShapeKind::Box { size: [1.0; 3], rounding: 0.0 }), Some(8));
-        assert_eq!(count(ShapeKind::Cylinder { radius, length }), Some(2));
-        assert_eq!(count(ShapeKind::Cylinder { radius, length: 0.0 }), Some(1));
+        assert_eq!(count(ShapeKind::Cylinder { radius, length, sides: None, rounding: 0.0 }), Some(2));
+        assert_eq!(count(ShapeKind::Cylinder { radius, length: 0.0, sides: None, rounding: 0.0 }), Some(1));
         assert_eq!(count(ShapeKind::Ellipsoid { semi_axes: [0.1, 0.2, 0.3] }), Some(1));
         assert_eq!(count(ShapeKind::Hull { points: vec![[0.0; 3]; 5], rounding: 0.0 }), Some(5));
         assert_eq!(count(plane.clone()), None);
@@ -332,6 +365,16 @@ mod tests {
         assert_eq!(count(&hull(0.0), &block(0.1)), Some(4 + 8 + 72));
         assert_eq!(count(&hull(0.1), &hull(0.0)), Some(4 + 4 + 36));
         assert_eq!(count(&hull(0.0), &hull(0.0)).or(count(&block(0.0), &block(0.0))), None);
+        let cylinder = |sides, rounding| ShapeKind::Cylinder { radius: 0.1, length: 0.4, sides, rounding };
+        assert_eq!(count(&cylinder(None, 0.0), &capsule), Some(2 + 1));
+        assert_eq!(count(&capsule, &cylinder(Some(12), 0.0)), Some(2 + 36));
+        assert_eq!(count(&block(0.1), &cylinder(Some(12), 0.0)), Some(24 + 8 + 36 * 12));
+        assert_eq!(count(&hull(0.0), &cylinder(Some(6), 0.01)), Some(12 + 4 + 18 * 6));
+        assert_eq!(count(&cylinder(Some(6), 0.0), &cylinder(Some(5), 0.01)), Some(12 + 10 + 18 * 15));
+        for other in [cylinder(None, 0.0), block(0.1), hull(0.1), cylinder(Some(6), 0.01)] {
+            assert_eq!(count(&cylinder(None, 0.0), &other).or(count(&other, &cylinder(None, 0.0))), None);
+        }
+        assert_eq!(count(&cylinder(Some(6), 0.0), &block(0.0)).or(count(&block(0.1), &cylinder(Some(64), 0.0))), None);
         // The size of a box is that with its rounding, so that its lowest ball is as low.
         let plane = ShapeKind::Plane { normal: Z };
         let lowest = |kind| elementary(&plane, &kind).map(|places| (places[0].kind, places[0].second));
@@ -350,7 +393,7 @@ mod tests {
             ShapeKind::Point,
             ShapeKind::Capsule { radius, length },
             ShapeKind::Box { size: [1.0; 3], rounding: 0.0 },
-            ShapeKind::Cylinder { radius, length },
+            ShapeKind::Cylinder { radius, length, sides: None, rounding: 0.0 },
             ShapeKind::Ellipsoid { semi_axes: [0.1, 0.2, 0.3] },
             ShapeKind::Hull { points: TETRAHEDRON.to_vec(), rounding: 0.0 },
             ShapeKind::HeightField {
@@ -366,6 +409,7 @@ mod tests {
                     8 => matches!(least, 1..=4 | 7),
                     _ if i == j => i == 1 || i == 3,
                     4 | 7 => least <= 3,
+                    5 if least == 3 => true,
                     most => least == 0 || (least <= 2 && most < 6),
                 };
                 assert_eq!(found, wanted, "{} and {}", a.word(), b.word());

@@ -5,7 +5,7 @@ use super::numbers::{Numbers, Quantity};
 use crate::import::raw::{RawModel, RawNumber, RawShape};
 use crate::import::source::Span;
 use crate::import::words::quote;
-use crate::model::{Mount, Rotation, Shape, ShapeKind, ShapeSpec, Value, SHAPES};
+use crate::model::{Mount, Rotation, Shape, ShapeKind, ShapeSpec, Value, SHAPES, SIDES};
 
 /// What to write in place of a parameter.
 const CONSTANT: &str = "write a constant: parameters do not change shapes";
@@ -43,6 +43,7 @@ fn entries(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) 
         ("radius", raw.radius.as_ref().map(|x| x.span), "`radius = ..`, in metres"),
         ("length", raw.length.as_ref().map(|x| x.span), "`length = ..`, along its z axis in metres"),
         ("size", raw.size.as_ref().map(|x| x.span), "`size = [x, y, z]`, the lengths of its edges in metres"),
+        ("sides", raw.sides.as_ref().map(|x| x.span), ""),
         ("rounding", raw.rounding.as_ref().map(|x| x.span), ""),
         ("semi_axes", raw.semi_axes.as_ref().map(|x| x.span), "`semi_axes = [x, y, z]`, in metres"),
         ("normal", raw.normal.as_ref().map(|x| x.span), ""),
@@ -101,7 +102,23 @@ fn kind(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) -> 
         }
         "cylinder" => {
             let (radius, length) = (length(&raw.radius, "radius", MORE), length(&raw.length, "length", DISC));
-            Some(ShapeKind::Cylinder { radius: radius?, length: length? })
+            let sides = sides(raw, what, numbers);
+            let rounding = raw.rounding.as_ref().map_or(0.0, |x| size(x, "rounding", SHARP, what, numbers));
+            let (radius, length) = (radius?, length?);
+            if let (Some(given), None) = (&raw.rounding, &raw.sides) {
+                let message = format!("{what}: the `rounding` of a cylinder without `sides`");
+                let help = "add `sides = 12`: the rounding is that of the prism which it is for boxes, hulls and other cylinders";
+                numbers.findings.error(given.span, message, help);
+            }
+            // What is not greater than zero, or not a number, was reported.
+            if let (Some(given), true) =
+                (&raw.rounding, rounding > 0.0 && (rounding >= radius || 2.0 * rounding >= length))
+            {
+                let message = format!("{what}: `rounding` leaves nothing of it");
+                let help = "write a radius below that of the cylinder and below half of its length";
+                numbers.findings.error(given.span, message, help);
+            }
+            Some(ShapeKind::Cylinder { radius, length, sides, rounding })
         }
         "box" => {
             let edges = raw.size.as_ref()?;
@@ -136,6 +153,23 @@ fn kind(raw: &RawShape, spec: &ShapeSpec, what: &str, numbers: &mut Numbers) -> 
             Some(ShapeKind::Plane { normal: normal.unwrap_or(Some([0.0, 0.0, 1.0]))? })
         }
     }
+}
+
+/// The sides of a cylinder; `None` where there are none, or something was reported.
+fn sides(raw: &RawShape, what: &str, numbers: &mut Numbers) -> Option<usize> {
+    let given = raw.sides.as_ref()?;
+    let value = numbers.constant(given, Quantity::Plain, &format!("{what}: `sides`"), CONSTANT);
+    let (least, most) = SIDES;
+    if value.fract() == 0.0 && (least as f64..=most as f64).contains(&value) {
+        return Some(value as usize);
+    }
+    // NaN stands for what was reported.
+    if !value.is_nan() {
+        let message = format!("{what}: `sides` is no whole number from {least} to {most}");
+        let help = "write how many sides the prism has that it is for boxes, hulls and other cylinders";
+        numbers.findings.error(given.span, message, help);
+    }
+    None
 }
 
 /// Slopes above this one are suspicious: 84°.

@@ -8,7 +8,7 @@ use crate::model::SHAPES;
 
 /// Puts a floor among the shapes of a model that has none yet, with its friction as that of all contacts.
 pub(super) fn add(floor: Floor, taken: &mut Taken, raw: &mut RawModel) {
-    raw.floor = Some(raw.shapes.len());
+    raw.floors.push(raw.shapes.len());
     raw.shapes.push(plane(taken.shape("floor", CORNERS), floor));
     raw.surface.friction = Some(RawNumber::constant(floor.friction, Span::FILE));
 }

@@ -326,6 +326,8 @@ pub struct RawShape {
     pub length: Option<RawNumber>,
     /// Lengths of edges, m.
     pub size: Option<RawVec3>,
+    /// Sides of the prism that a cylinder is.
+    pub sides: Option<RawNumber>,
     /// Radius of edges and corners, m.
     pub rounding: Option<RawNumber>,
     /// Semi-axes of an ellipsoid, m.
@@ -371,6 +373,7 @@ impl RawShape {
             radius: None,
             length: None,
             size: None,
+            sides: None,
             rounding: None,
             semi_axes: None,
             normal: None,
@@ -474,8 +477,8 @@ pub struct RawModel {
     pub all_pairs: Option<Span>,
     /// Descriptions of the same mechanism after changes of its tree, in file order.
     pub variants: Vec<RawVariant>,
-    /// A shape, by its index, that all other shapes can touch, whatever pairs are asked for.
-    pub floor: Option<usize>,
+    /// Shapes, by their indices, that all other shapes can touch, whatever pairs are asked for.
+    pub floors: Vec<usize>,
     /// Whether a body or joint was left out after a finding. Unknown names and bodies without a joint are then not
     /// reported again.
     pub incomplete: bool,
@@ -501,7 +504,7 @@ impl RawModel {
             surface: RawSurface::default(),
             all_pairs: None,
             variants: Vec::new(),
-            floor: None,
+            floors: Vec::new(),
             incomplete: false,
             lenient: false,
         }

@@ -133,6 +133,17 @@ pub enum LoopKind {
         /// Radius of the ball, m.
         radius: Value,
     },
+    /// A capsule about the second frame's origin rolls without slip on a cylinder about the first frame's. Contacts are of this
+    /// kind; loops in models are not.
+    #[cfg(feature = "hulls")]
+    RollingCapsuleOnCylinder {
+        /// Axes of the cylinder and the capsule, in their own frames.
+        axes: [[f64; 3]; 2],
+        /// Lengths of the cylinder and of the straight part of the capsule, m.
+        lengths: [Value; 2],
+        /// Radii of the cylinder and the capsule, m.
+        radii: [Value; 2],
+    },
     /// A ball about the second frame's origin rolls without slip on a cylinder about the first frame's.
     RollingBallOnCylinder {
         /// Axis of the cylinder in the first frame.
@@ -286,6 +297,15 @@ static ON_FIELD: LoopSpec =
 /// What rolls on hulls, which is no kind of loop in models either.
 #[cfg(feature = "hulls")]
 static ON_HULL: LoopSpec = LoopSpec { words: Words::new("rolling_ball_on_hull", &[], &[]), rows: &[M, M, M], ..PLAIN };
+
+/// Capsules that roll on cylinders, which is no kind of loop in models either.
+#[cfg(feature = "hulls")]
+static ON_CYLINDER: LoopSpec = LoopSpec {
+    words: Words::new("rolling_capsule_on_cylinder", &[], &[]),
+    directions: &[axis(InFirst), direction("axis2", InSecond)],
+    rows: &[M, M, M],
+    ..PLAIN
+};
 
 /// Every kind of loop that models can have, in the order of the variants of [`LoopKind`].
 pub static LOOPS: [LoopSpec; 21] = [
@@ -486,6 +506,8 @@ impl LoopKind {
             LoopKind::RollingBallOnField { .. } => return &ON_FIELD,
             #[cfg(feature = "hulls")]
             LoopKind::RollingBallOnHull { .. } => return &ON_HULL,
+            #[cfg(feature = "hulls")]
+            LoopKind::RollingCapsuleOnCylinder { .. } => return &ON_CYLINDER,
             LoopKind::KnifeEdge { .. } => 19,
             LoopKind::Pfaffian { .. } => 20,
         };
@@ -525,6 +547,8 @@ impl LoopKind {
             LoopKind::RollingBallOnField { .. } => Vec::new(),
             #[cfg(feature = "hulls")]
             LoopKind::RollingBallOnHull { .. } => Vec::new(),
+            #[cfg(feature = "hulls")]
+            LoopKind::RollingCapsuleOnCylinder { axes: [a, b], .. } => vec![a, b],
         }
     }
 
@@ -545,6 +569,8 @@ impl LoopKind {
             LoopKind::RollingBallOnField { ball, .. } => ball.iter_mut().map(|ball| &mut ball.radius).collect(),
             #[cfg(feature = "hulls")]
             LoopKind::RollingBallOnHull { radius, .. } => vec![radius],
+            #[cfg(feature = "hulls")]
+            LoopKind::RollingCapsuleOnCylinder { lengths, radii, .. } => lengths.iter_mut().chain(radii).collect(),
             LoopKind::Pfaffian { row } => row.iter_mut().collect(),
             _ => Vec::new(),
         }
@@ -579,6 +605,10 @@ impl LoopKind {
             #[cfg(feature = "hulls")]
             LoopKind::RollingBallOnHull { hull, rounding, radius } => {
                 Closure::RollingBallOnHull { hull, rounding: Value::Const(rounding), radius }
+            }
+            #[cfg(feature = "hulls")]
+            LoopKind::RollingCapsuleOnCylinder { lengths, radii, .. } => {
+                Closure::RollingCapsuleOnCylinder { lengths, radii }
             }
             LoopKind::KnifeEdge { .. } => Closure::KnifeEdge,
             LoopKind::Pfaffian { row } => Closure::Pfaffian { row },

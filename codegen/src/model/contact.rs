@@ -60,6 +60,10 @@ pub enum ShapeKind {
         radius: f64,
         /// Length, m.
         length: f64,
+        /// Sides of the prism that it is for capsules, boxes, hulls and other cylinders; `None` where it is none.
+        sides: Option<usize>,
+        /// Radius of the edges and corners of that prism, within the cylinder, m; 0 where these are sharp.
+        rounding: f64,
     },
     /// An ellipsoid with its axes along x, y and z.
     Ellipsoid {
@@ -94,10 +98,13 @@ pub enum ShapeKind {
 pub struct ShapeSpec {
     /// Its words.
     pub words: Words,
-    /// Keys of its dimensions: `radius`, `length`, `size`, `rounding`, `semi_axes` `normal`, `points`,
+    /// Keys of its dimensions: `radius`, `length`, `size`, `sides`, `rounding`, `semi_axes`, `normal`, `points`,
     /// `file`, `scale`, `most`, `spacing` or `heights`.
     pub keys: &'static [&'static str],
 }
+
+/// Fewest and most sides of a cylinder.
+pub const SIDES: (usize, usize) = (3, 64);
 
 /// Every kind of shape, in the order of the variants of [`ShapeKind`].
 pub static SHAPES: &[ShapeSpec] = &[
@@ -105,7 +112,10 @@ pub static SHAPES: &[ShapeSpec] = &[
     ShapeSpec { words: Words::new("sphere", &[], &["ball"]), keys: &["radius"] },
     ShapeSpec { words: Words::new("capsule", &[], &["pill"]), keys: &["radius", "length"] },
     ShapeSpec { words: Words::new("box", &[], &["cube", "cuboid", "block"]), keys: &["size", "rounding"] },
-    ShapeSpec { words: Words::new("cylinder", &[], &["disc", "disk", "wheel"]), keys: &["radius", "length"] },
+    ShapeSpec {
+        words: Words::new("cylinder", &[], &["disc", "disk", "wheel"]),
+        keys: &["radius", "length", "sides", "rounding"],
+    },
     ShapeSpec { words: Words::new("ellipsoid", &[], &["egg", "spheroid"]), keys: &["semi_axes"] },
     ShapeSpec { words: Words::new("plane", &[], &["floor", "wall", "half_space", "halfspace"]), keys: &["normal"] },
     ShapeSpec {
@@ -174,7 +184,7 @@ mod tests {
             ShapeKind::Sphere { radius },
             ShapeKind::Capsule { radius, length },
             ShapeKind::Box { size: [1.0, 2.0, 3.0], rounding: 0.0 },
-            ShapeKind::Cylinder { radius, length },
+            ShapeKind::Cylinder { radius, length, sides: None, rounding: 0.0 },
             ShapeKind::Ellipsoid { semi_axes: [1.0, 2.0, 3.0] },
             ShapeKind::Plane { normal },
             ShapeKind::Hull { points: vec![[0.0; 3]], rounding: 0.0 },

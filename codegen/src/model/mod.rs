@@ -12,7 +12,7 @@ use std::sync::Arc;
 pub use constraint::{
     Constraint, ConstraintKind, Direction, LoopKind, LoopNumbers, LoopSpec, Mount, NumberKey, Stands, LOOPS,
 };
-pub use contact::{Contact, Shape, ShapeKind, ShapeSpec, SHAPES};
+pub use contact::{Contact, Shape, ShapeKind, ShapeSpec, SHAPES, SIDES};
 pub use joint::{Coordinate, Freedom, Joint, JointBounds, JointKind, JointMotion, JointSpec, JOINTS};
 pub(crate) use joint::{FIXED, FLOATING, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL};
 

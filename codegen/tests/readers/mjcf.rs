@@ -27,6 +27,12 @@ fn files(path: &Path) -> std::io::Result<Vec<u8>> {
         "robots/meshes/square.obj" => "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3 4\n",
         "robots/meshes/lost.obj" => "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n",
         "robots/meshes/flat.obj" => "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+        "robots/ground/steps.hf" => return Ok(heights(4, 5, |k| k as f32)),
+        "robots/ground/short.hf" => return Ok(heights(4, 5, |k| k as f32)[..50].to_vec()),
+        "robots/ground/few.hf" => return Ok(heights(3, 5, |k| k as f32)),
+        "robots/ground/many.hf" => return Ok(heights(300, 300, |k| k as f32)),
+        "robots/ground/odd.hf" => return Ok(heights(4, 4, |k| if k == 3 { f32::NAN } else { 1.0 })),
+        "robots/ground/none.hf" => "",
         _ => return Err(Error::new(ErrorKind::NotFound, "no such file")),
     };
     Ok(text.as_bytes().to_vec())
@@ -55,6 +61,12 @@ fn msh() -> Vec<u8> {
     let counts = [4, 0, 0, 4].iter().flat_map(|n: &i32| n.to_le_bytes());
     let corners = CORNERS.iter().flatten().flat_map(|x| x.to_le_bytes());
     counts.chain(corners).chain(FACES.iter().flatten().flat_map(|k| k.to_le_bytes())).collect()
+}
+
+/// A file of MuJoCo's format for height fields.
+fn heights(rows: i32, columns: i32, h: impl Fn(i32) -> f32) -> Vec<u8> {
+    let counts = [rows, columns].into_iter().flat_map(i32::to_le_bytes);
+    counts.chain((0..rows * columns).flat_map(|k| h(k).to_le_bytes())).collect()
 }
 
 fn load(file: &str, text: &str, options: &ImportOptions) -> (Option<Model>, String) {
@@ -502,5 +514,101 @@ fn inertias_of_meshes() {
         assert!(findings.contains(said), "{said}: {findings}");
         // Where no mass depends on it, nothing is read.
         assert!(model(&text(mesh, "mass='0'/><geom size='0.1'")).1.contains("not used for contacts"));
+    }
+}
+
+/// A model with a ball and a height field of these attributes, its findings, and those with a floor.
+fn on_field(attributes: &str) -> [(Option<Model>, String); 2] {
+    let text = format!(
+        "<mujoco><compiler meshdir='ground'/><asset><hfield name='h' size='2 1.5 0.5 0.1' {attributes}/></asset><worldbody>\
+         <geom name='hills' type='hfield' hfield='h' pos='1 2 3'/><geom type='hfield' hfield='h' contype='0' conaffinity='0'/>\
+         <body name='b'><freejoint/><geom name='ball' size='0.05'/><geom name='drum' type='cylinder' size='0.1 0.1'/></body>\
+         </worldbody></mujoco>"
+    );
+    let floor = Some(Floor { height: -1.0, friction: 0.5 });
+    [None, floor].map(|floor| load("robots/m.xml", &text, &ImportOptions { floor, ..ImportOptions::default() }))
+}
+
+/// Height fields have the heights of MuJoCo, from 0 to the third number of `size`, and where there is a floor, shapes touch them
+/// too.
+#[cfg(feature = "height_fields")]
+#[test]
+fn height_fields_are_ground() {
+    let level = |model: &Model| {
+        let field = model.shapes.iter().find(|shape| shape.name == "hills").expect("a field");
+        let ShapeKind::HeightField { heights, field: surface } = &field.kind else { panic!("no height field") };
+        assert_eq!((field.mount.body, field.mount.placement.xyz.map(x)), (None, [1.0, 2.0, 3.0]));
+        (surface.spacing, heights.clone())
+    };
+    // Of a file, the first row is that of the least y; of a list, that of the greatest.
+    let part = |k: u8| f64::from(f32::from(k) / 19.0_f32) * 0.5;
+    let rows: Vec<Vec<f64>> = (0..4_u8).map(|j| (0..5).map(|i| part(5 * j + i)).collect()).collect();
+    let listed = "0 0 0 0 0  0 0 0 0 1  0 0 2 0 0  3 0 0 0 0";
+    for (attributes, wanted) in [
+        ("file='steps.hf'", rows.clone()),
+        ("file='steps.hf' nrow='9' ncol='9' content_type='image/vnd.mujoco.hfield'", rows),
+        (
+            &format!("nrow='4' ncol='5' elevation='{listed}'"),
+            vec![
+                vec![0.5, 0.0, 0.0, 0.0, 0.0],
+                vec![0.0, 0.0, f64::from(2.0_f32 / 3.0) * 0.5, 0.0, 0.0],
+                vec![0.0, 0.0, 0.0, 0.0, f64::from(1.0_f32 / 3.0) * 0.5],
+                vec![0.0; 5],
+            ],
+        ),
+        (&format!("nrow='4' ncol='5' elevation='{}'", "7 ".repeat(20)), vec![vec![0.0; 5]; 4]),
+    ] {
+        let [(free, findings), (standing, others)] = on_field(attributes);
+        let (free, standing) = (free.expect(&findings), standing.expect(&others));
+        assert_eq!(level(&free), ([1.0, 1.0], wanted.clone()), "{attributes}");
+        assert_eq!(level(&standing), level(&free));
+        assert_eq!((free.contacts.len(), free.shapes.len()), (0, 3));
+        // The ball on the floor and the field, the rims of the drum on the floor; the drum cannot touch the field.
+        let names: Vec<&str> = standing.contacts.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, ["floor/ball", "hills/ball", "floor/drum/1", "floor/drum/2"], "{others}");
+        assert!(others.contains("warning: 1 pair of shapes cannot touch: `hills/drum`"), "{others}");
+        let text =
+            "<compiler strippath='true' meshdir='ground'/><asset><hfield file='C/steps.hf' size='1 1 1 1'/></asset>\
+                    <worldbody><geom type='hfield' hfield='steps'/><body><joint/><geom size='0.1'/></body></worldbody>";
+        assert_eq!(model(text).0.shapes.len(), 2);
+    }
+}
+
+/// A field that is not read is a warning where nothing touches it, and an error where there is a floor.
+#[cfg(feature = "height_fields")]
+#[test]
+fn height_fields_that_are_not_read() {
+    for (attributes, said) in [
+        (
+            "file='hills.png'",
+            "`hills.png` is a PNG file, which is not read; its geoms touch nothing\n  help: write the heights",
+        ),
+        ("file='a.PNG'", "`a.PNG` is a PNG file"),
+        ("file='steps.hf' content_type='image/png'", "`image/png` is not read"),
+        ("file='steps.hf' content_type='text/plain'", "`text/plain` is no height field"),
+        (
+            "file='lost.hf'",
+            "cannot read `lost.hf`: no such file; its geoms touch nothing\n  help: write its path relative",
+        ),
+        ("file='/steps.hf'", "its path is not relative to the main file"),
+        ("file='short.hf'", "`short.hf`: it has 50 bytes, and 4 rows of 5 heights take 88"),
+        ("file='none.hf'", "`none.hf`: it does not begin with the numbers of its rows and columns"),
+        (
+            "file='few.hf'",
+            "3 rows of 5 heights are too few; its geoms touch nothing\n  help: give it at least 4 rows of 4",
+        ),
+        ("file='many.hf'", "300 rows of 300 heights are too many"),
+        ("file='odd.hf'", "1 of its heights are not finite"),
+        ("nrow='1' ncol='2' elevation='1 2'", "1 rows of 2 heights are too few"),
+    ] {
+        let [(free, findings), (standing, others)] = on_field(attributes);
+        assert_eq!(free.expect(&findings).shapes.len(), 2);
+        assert!(standing.is_none() && findings.contains(&format!("warning: height field `h`: {said}")), "{findings}");
+        assert!(others.contains(&format!("error: height field `h`: {said}")), "{others}");
+    }
+    // Heights that are written at run time are none here.
+    for (model, findings) in on_field("nrow='4' ncol='5'") {
+        assert!(model.expect(&findings).shapes.iter().all(|shape| shape.name != "hills"));
+        assert!(findings.contains("notice: height field `h`: its heights are not in the file"), "{findings}");
     }
 }

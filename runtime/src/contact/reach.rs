@@ -45,6 +45,10 @@ fn radii<S: Real>(closure: &Closure<S>) -> Option<(Option<f64>, f64)> {
         Closure::RollingBallOnHull { hull, rounding, radius } => {
             (Some(hull.radius + rounding.abs().to_f64()), radius.abs().to_f64())
         }
+        #[cfg(feature = "hulls")]
+        Closure::RollingCapsuleOnCylinder { lengths: [l, m], radii: [a, b] } => {
+            (Some(length([S::constant(0.5) * *l, *a])), 0.5 * m.abs().to_f64() + b.abs().to_f64())
+        }
         Closure::RollingBallOnCylinder { length: l, radii: [a, b] } => {
             (Some(length([S::constant(0.5) * *l, *a])), b.abs().to_f64())
         }

@@ -99,7 +99,7 @@ impl<S: Copy> Closure<S> {
             #[cfg(feature = "height_fields")]
             Closure::RollingBallOnField { .. } => 3,
             #[cfg(feature = "hulls")]
-            Closure::RollingBallOnHull { .. } => 3,
+            Closure::RollingBallOnHull { .. } | Closure::RollingCapsuleOnCylinder { .. } => 3,
             Closure::PointOnLine => 2,
             Closure::Distance { .. }
             | Closure::PointOnPlane
@@ -124,7 +124,7 @@ impl<S: Copy> Closure<S> {
             return true;
         }
         #[cfg(feature = "hulls")]
-        if let Closure::RollingBallOnHull { .. } = self {
+        if let Closure::RollingBallOnHull { .. } | Closure::RollingCapsuleOnCylinder { .. } = self {
             return true;
         }
         use Closure::{
@@ -274,6 +274,10 @@ impl<S: Scalar> Closure<S> {
             #[cfg(feature = "hulls")]
             Closure::RollingBallOnHull { hull, rounding, radius } => {
                 Some(Touch::ball_on_hull(at, hull, &[*rounding, *radius]))
+            }
+            #[cfg(feature = "hulls")]
+            Closure::RollingCapsuleOnCylinder { lengths, radii } => {
+                Some(Touch::capsule_on_cylinder(at, lengths, radii))
             }
             Closure::RollingBallOnCylinder { length, radii } => Some(Touch::ball_on_cylinder(at, *length, radii)),
             #[cfg(feature = "height_fields")]

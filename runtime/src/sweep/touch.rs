@@ -120,11 +120,54 @@ impl<S: Scalar> Touch<S> {
 
     /// A ball about the origin of `B` on a cylinder about that of `A` and its z; `radii` of the cylinder and the ball.
     pub fn ball_on_cylinder(at: &Relative<S>, length: S, radii: &[S; 2]) -> Touch<S> {
-        let across = at.across();
+        Touch::ball_on_cylinder_at([S::zero(); 3], at, length, radii)
+    }
+
+    /// The same about a `middle`, from the origin of `B`.
+    fn ball_on_cylinder_at(middle: Vec3<S>, at: &Relative<S>, length: S, radii: &[S; 2]) -> Touch<S> {
+        let (z, d) = (at.axis(2), add3(at.d, middle));
+        let across = add3(d, scale3(-dot3(z, d), z));
         // On the axis itself there is no direction across it: the addend gives zero.
         let distance = (dot3(across, across) + S::constant(1e-36)).sqrt();
         let mantle = (distance - radii[0], scale3(S::one() / distance, across));
-        Touch::ball_on_faces(&[mantle, ends(at.axis(2), at.d, length)], &[S::zero(), radii[1]])
+        let touch = Touch::ball_on_faces(&[mantle, ends(z, d, length)], &[S::zero(), radii[1]]);
+        Touch { at: add3(middle, touch.at), ..touch }
+    }
+
+    /// A ball that passes along a segment about the origin of `B` and its z, on a cylinder about that of `A` and its z;
+    /// lengths and radii of the cylinder and the segment.
+    ///
+    /// Where the line of the segment is nearest to the axis of the cylinder beside its mantle, it is nearest to the cylinder there,
+    /// too. Where it is nearest to the axis beyond an end, by `H`, it is nearest to the cylinder on the way back, at most as far as
+    /// the plane of that end: with the cosine `c` and the sine `b` of the angle between both axes, and the distance `a` of the
+    /// lines, it has the distances `√(a² + b²u²)` from the axis and `H − c u` from that plane after `u`. It is nearest to the rim
+    /// where `u = c H + R b² u / √(a² + b²u²)`. The difference of both sides is convex, so that Newton's method comes to the
+    /// solution without fail from any place beyond.
+    #[cfg(feature = "hulls")]
+    pub fn capsule_on_cylinder(at: &Relative<S>, lengths: &[S; 2], radii: &[S; 2]) -> Touch<S> {
+        let [height, reach] = lengths.map(|length| S::constant(0.5) * length);
+        let (z, d) = (at.axis(2), at.d);
+        let along = dot3(z, d);
+        // As of capsules, the middle of the common part where the lines are parallel.
+        let square = z[0] * z[0] + z[1] * z[1];
+        let inverse = square.reciprocal_above(S::constant(1e-24));
+        let common = S::constant(0.5) * (clamp(along - reach, height) + clamp(along + reach, height));
+        let crossing = above(inverse);
+        let foot = crossing * (z[2] * (z[0] * d[0] + z[1] * d[1]) * inverse - d[2])
+            + (S::one() - crossing) * ((common - along) * z[2]);
+        let level = along + foot * z[2];
+        let side = sign(level);
+        let beyond = above(side * level - height);
+        let excess = beyond * (side * level - height);
+        let apart = add3(add3(d, [S::zero(), S::zero(), foot]), scale3(-level, z));
+        let cosine = sign(z[2]) * z[2];
+        let rim = Rim { lift: cosine * excess, radius: radii[0], square, apart: dot3(apart, apart) };
+        let back = beyond * rim.back();
+        // Not beyond the plane of the end.
+        let far = above(cosine * back - excess);
+        let back = far * (excess * cosine.reciprocal_above(S::constant(1e-24))) + (S::one() - far) * back;
+        let here = clamp(foot - side * sign(z[2]) * back, reach);
+        Touch::ball_on_cylinder_at([S::zero(), S::zero(), here], at, lengths[0], radii)
     }
 
     /// A ball about the origin of `B`, or this origin itself, on a height field in the axes of `A`. The gap is the way down along
@@ -173,6 +216,50 @@ impl<S: Scalar> Touch<S> {
         let normal = scale3(S::one() / length, normal);
         let distance = (S::one() - inside) * length + inside * largest;
         Touch { gap: distance - (radii[0] + radii[1]), normal, at: scale3(-radii[1], normal) }
+    }
+}
+
+/// What decides where a line is nearest to the rim of a cylinder.
+#[cfg(feature = "hulls")]
+struct Rim<S> {
+    /// `c H`, m.
+    lift: S,
+    /// `R`, m.
+    radius: S,
+    /// `b²`.
+    square: S,
+    /// `a²`, m².
+    apart: S,
+}
+
+#[cfg(feature = "hulls")]
+impl<S: Scalar> Rim<S> {
+    /// Steps of Newton's method, of which the last two give the result its derivatives. They square the error, except where the
+    /// rim is seen from the middle of its curvature: there each step leaves two thirds of it, and the distance does not change
+    /// up to its fourth power.
+    const STEPS: usize = 10;
+
+    /// How far the place lies behind that which is nearest to the axis, m.
+    fn back(&self) -> S {
+        let still = Rim {
+            lift: self.lift.still(),
+            radius: self.radius.still(),
+            square: self.square.still(),
+            apart: self.apart.still(),
+        };
+        let mut u = still.lift + still.radius * still.square.sqrt();
+        for _ in 2..Self::STEPS {
+            u = still.next(u);
+        }
+        self.next(self.next(u))
+    }
+
+    /// The next step.
+    fn next(&self, u: S) -> S {
+        let inverse = S::one() / (self.apart + self.square * (u * u) + S::constant(1e-36)).sqrt();
+        let (part, pull) = (u * inverse, self.radius * self.square);
+        let slope = S::one() - pull * self.apart * (inverse * inverse * inverse);
+        (self.lift + pull * self.square * (part * part * part)) / slope
     }
 }
 

@@ -152,6 +152,10 @@ impl<S: Copy> Closure<S> {
             Closure::RollingBallOnHull { hull, rounding, radius } => {
                 Closure::RollingBallOnHull { hull, rounding: of(rounding), radius: of(radius) }
             }
+            #[cfg(feature = "hulls")]
+            Closure::RollingCapsuleOnCylinder { lengths, radii } => {
+                Closure::RollingCapsuleOnCylinder { lengths: lengths.map(&mut of), radii: radii.map(of) }
+            }
             Closure::RollingBallOnCylinder { length, radii } => {
                 Closure::RollingBallOnCylinder { length: of(length), radii: radii.map(of) }
             }

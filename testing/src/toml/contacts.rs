@@ -19,9 +19,17 @@ impl Writer<'_> {
             match &shape.kind {
                 ShapeKind::Point => {}
                 ShapeKind::Sphere { radius } => line(out, "radius", format!("{radius:?}")),
-                ShapeKind::Capsule { radius, length } | ShapeKind::Cylinder { radius, length } => {
+                ShapeKind::Capsule { radius, length } => {
                     line(out, "radius", format!("{radius:?}"));
                     line(out, "length", format!("{length:?}"));
+                }
+                ShapeKind::Cylinder { radius, length, sides, rounding } => {
+                    line(out, "radius", format!("{radius:?}"));
+                    line(out, "length", format!("{length:?}"));
+                    if let Some(sides) = sides {
+                        line(out, "sides", format!("{sides}"));
+                        line(out, "rounding", format!("{rounding:?}"));
+                    }
                 }
                 ShapeKind::Box { size, rounding } => {
                     line(out, "size", format!("{size:?}"));

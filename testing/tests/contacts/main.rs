@@ -2,6 +2,7 @@
 
 mod answers;
 mod boxes;
+mod cylinders;
 mod edges;
 mod far;
 mod fields;

@@ -2,10 +2,9 @@
 
 use std::collections::HashMap;
 
-use super::geom::{self, Geom};
+use super::geom::{self, Geom, Solids};
 use super::inertia;
 use super::joint::{self, Joint, Kind, Rules};
-use super::mesh::Meshes;
 use super::pose::{between, pose, Pose};
 use super::tree::{Body, Part};
 use crate::import::raw::{RawBody, RawFrame, RawJoint, RawModel};
@@ -71,7 +70,7 @@ pub(super) fn all<'d>(
     reader: &mut Reader,
     bodies: &[Body<'d>],
     rules: Rules,
-    (meshes, shape_names): (&Meshes, Taken),
+    (solids, shape_names): (Solids, Taken),
     raw: &mut RawModel,
 ) -> Built<'d> {
     let mut built = Built { shape_names, ..Built::default() };
@@ -90,14 +89,23 @@ pub(super) fn all<'d>(
             (part, geom::read(reader, part, rules.compiler, &whose))
         });
         let geoms: Vec<(&Part, Geom)> = read.filter_map(|(part, geom)| Some((part, geom?))).collect();
-        let of_meshes = (k > 0 && raw.floor.is_some()).then_some(meshes);
+        let hulls = k > 0 && !raw.floors.is_empty();
         for (part, geom) in &geoms {
-            let from = (&part.element, of_meshes);
-            raw.shapes.extend(geom.shape(reader, from, &built.names[k], &mut built.shape_names));
+            let Some(shape) =
+                geom.shape(reader, (&part.element, solids, hulls), &built.names[k], &mut built.shape_names)
+            else {
+                continue;
+            };
+            // Where there is a floor, height fields are others.
+            #[cfg(feature = "height_fields")]
+            if shape.field.is_some() && !raw.floors.is_empty() {
+                raw.floors.push(raw.shapes.len());
+            }
+            raw.shapes.push(shape);
         }
         if k > 0 {
             let mut geoms: Vec<Geom> = geoms.into_iter().map(|(_, geom)| geom).collect();
-            masses.push(inertia::of_body(reader, body, &mut geoms, rules.compiler, meshes));
+            masses.push(inertia::of_body(reader, body, &mut geoms, rules.compiler, solids.meshes));
             built.chain(reader, (k, body), &joint_names[k], rules, raw);
         }
         for part in &body.sites {

@@ -58,6 +58,14 @@ const ATTRIBUTES: &[&str] = &[
 
 const TYPES: &[&str] = &["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"];
 
+/// What geoms get their shapes from that are not primitives.
+#[derive(Clone, Copy)]
+pub(super) struct Solids<'s, 'm, 'd> {
+    pub meshes: &'s Meshes<'m, 'd>,
+    #[cfg(feature = "height_fields")]
+    pub fields: &'s super::hfield::Fields<'m, 'd>,
+}
+
 /// A geom in its body.
 pub(super) struct Geom<'d> {
     /// One of MuJoCo's types.
@@ -73,6 +81,9 @@ pub(super) struct Geom<'d> {
     group: f64,
     /// The mesh that it names.
     mesh: Option<Spanned<&'d str>>,
+    /// The height field that it names.
+    #[cfg(feature = "height_fields")]
+    field: Option<Spanned<&'d str>>,
     /// The body that its mesh bounds, once it was read.
     solid: Option<Solid>,
     touches: bool,
@@ -116,7 +127,21 @@ pub(super) fn read<'d>(reader: &mut Reader, part: &Part<'d>, compiler: &Compiler
     let size = if sized { size(reader, element, kind, ends.map(|e| e.1), whose)? } else { [0.0; 3] };
     let shell = flag(reader, element, "shellinertia", whose).unwrap_or(false);
     let pose = part.frame.then(&own);
-    Some(Geom { kind, size, pose, shell, mass, density, group, mesh, solid: None, touches, span: place(element.node) })
+    Some(Geom {
+        kind,
+        size,
+        pose,
+        shell,
+        mass,
+        density,
+        group,
+        mesh,
+        #[cfg(feature = "height_fields")]
+        field: element.attribute("hfield"),
+        solid: None,
+        touches,
+        span: place(element.node),
+    })
 }
 
 /// MuJoCo's sizes. A class states the first of them, and an element may replace some of these.
@@ -260,45 +285,47 @@ impl Geom<'_> {
         }
     }
 
-    /// The shape for contacts, that of a mesh where `meshes` are given; `None` where it touches nothing.
+    /// The shape for contacts, that of a mesh where `hulls` are asked for; `None` where it touches nothing.
     pub fn shape(
         &self,
         reader: &mut Reader,
-        (element, meshes): (&Element, Option<&Meshes>),
+        (element, solids, hulls): (&Element, Solids, bool),
         body: &Spanned<String>,
         taken: &mut Taken,
     ) -> Option<RawShape> {
         if !self.touches {
             return None;
         }
-        let corners = match (self.unread(), &self.mesh, meshes) {
-            (Some(_), ..) => {
-                let message =
-                    "shapes of height fields, of signed distance fields and of primitives that are fitted to \
-                               meshes are not used for contacts";
+        #[cfg(feature = "height_fields")]
+        if self.kind == "hfield" {
+            let field = solids.fields.of_geom(reader, self.field.as_ref(), self.span)?;
+            let shape = self.placed("height_field", CORNERS, element, body, taken)?;
+            return Some(RawShape { field: Some(field), ..shape });
+        }
+        let corners = match (self.unread(), &self.mesh) {
+            (Some(_), _) => {
+                let message = match cfg!(feature = "height_fields") {
+                    true => UNUSED[0],
+                    false => UNUSED[1],
+                };
                 reader.tally.notice(self.span, message);
                 return None;
             }
-            (None, Some(_), None) => {
+            (None, Some(_)) if !hulls => {
                 let message =
                     "the mesh of a `geom` is not used for contacts: those of moving bodies are, where a floor \
                                is asked for";
                 reader.tally.notice(self.span, message);
                 return None;
             }
-            (None, Some(mesh), Some(meshes)) => Some(meshes.hull(reader, mesh)?),
-            (None, None, _) => None,
+            (None, Some(mesh)) => Some(solids.meshes.hull(reader, mesh)?),
+            (None, None) => None,
         };
         let span = self.span;
         let number = |x: f64| Some(RawNumber::constant(x, span));
         let [a, b, c] = self.size;
         let word = if corners.is_some() { "hull" } else { self.kind };
-        let kind = SHAPES.iter().find(|spec| spec.word() == word)?;
-        let contacts = corners.as_ref().map_or(CORNERS, Vec::len);
-        let name = taken.shape(element.name().map_or(body.value.as_str(), |name| name.value), contacts);
-        let name = Spanned::new(name, element.name().map_or(span, |name| name.span));
-        let mut shape = RawShape::new(name, Some(Spanned::new(kind, span)));
-        (shape.body, shape.placement) = (Some(body.clone()), self.pose.raw(span));
+        let mut shape = self.placed(word, corners.as_ref().map_or(CORNERS, Vec::len), element, body, taken)?;
         shape.hull = corners.map(|corners| RawHull { keys: vec![("file", span)], corners: Some(corners) });
         match self.kind {
             "sphere" => shape.radius = number(a),
@@ -309,7 +336,29 @@ impl Geom<'_> {
         }
         Some(shape)
     }
+
+    /// A shape of a kind, without dimensions, that has as many contacts with a plane.
+    fn placed(
+        &self,
+        word: &str,
+        contacts: usize,
+        element: &Element,
+        body: &Spanned<String>,
+        taken: &mut Taken,
+    ) -> Option<RawShape> {
+        let kind = SHAPES.iter().find(|spec| spec.word() == word)?;
+        let name = taken.shape(element.name().map_or(body.value.as_str(), |name| name.value), contacts);
+        let name = Spanned::new(name, element.name().map_or(self.span, |name| name.span));
+        let shape = RawShape::new(name, Some(Spanned::new(kind, self.span)));
+        Some(RawShape { body: Some(body.clone()), placement: self.pose.raw(self.span), ..shape })
+    }
 }
+
+/// What is said about shapes that are not read, with and without height fields.
+const UNUSED: [&str; 2] = [
+    "shapes of signed distance fields and of primitives that are fitted to meshes are not used for contacts",
+    "shapes of height fields, of signed distance fields and of primitives that are fitted to meshes are not used for contacts",
+];
 
 fn capsule(m: f64, a: f64, b: f64, shell: bool) -> [f64; 3] {
     let (aa, height) = (a * a, 2.0 * b);

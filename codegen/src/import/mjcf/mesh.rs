@@ -2,17 +2,16 @@
 
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
 
+use super::assets::{extension, name_of, Assets};
 use super::classes::{Classes, MAIN};
-use super::element::{choice, flag, numbers, parsed, vec3, Element};
+use super::element::{choice, numbers, parsed, vec3, Element};
 use super::pose::{normalised, rotate, Pose, Quat, NONE};
 use crate::import::hull::{self, Told};
 use crate::import::mesh::{self, corners, msh, stl, Triangle, MOST};
 use crate::import::source::Spanned;
 use crate::import::words::quote;
 use crate::import::xml::{place, Reader};
-use crate::import::ReadFile;
 use crate::inertia::{cross, dot};
 use roxmltree::Node;
 
@@ -66,34 +65,20 @@ pub(super) struct Meshes<'m, 'd> {
     /// Corners of hulls; `None` where something was reported.
     hulls: RefCell<HashMap<String, Option<Vec<[f64; 3]>>>>,
     told: RefCell<Told>,
-    folder: PathBuf,
-    files: ReadFile<'m>,
+    assets: &'m Assets<'m>,
 }
 
 impl<'m, 'd> Meshes<'m, 'd> {
-    /// The meshes of the `asset` elements. `main` is the path of the main file, to whose folder those of `compiler` and
-    /// of the meshes are relative.
-    pub fn new(
-        reader: &mut Reader,
-        assets: &[Node<'d, 'd>],
-        compilers: &[Node<'d, 'd>],
-        classes: &Classes<'d>,
-        (main, files): (&Path, ReadFile<'m>),
-    ) -> Self {
-        let stated = |key: &str| compilers.iter().rev().find_map(|node| Element::plain(*node).attribute(key));
-        let folder = stated("meshdir").or(stated("assetdir")).map_or("", |folder| folder.value);
-        let strip = compilers.iter().any(|node| flag(reader, &Element::plain(*node), "strippath", "") == Some(true));
+    /// The meshes of the `asset` elements.
+    pub fn new(reader: &mut Reader, sections: &[Node<'d, 'd>], classes: &Classes<'d>, assets: &'m Assets<'m>) -> Self {
         let mut all = HashMap::new();
-        for node in assets.iter().flat_map(|asset| asset.children()).filter(|node| node.has_tag_name("mesh")) {
+        for node in sections.iter().flat_map(|asset| asset.children()).filter(|node| node.has_tag_name("mesh")) {
             let element = classes.resolve(reader, node, &["mesh"], MAIN);
             reader.attributes(node, ATTRIBUTES);
-            let file = element.attribute("file").map(|file| Path::new(file.value));
-            let stem = || Some(file?.file_stem()?.to_string_lossy().into_owned());
-            let Some(name) = element.name().map(|name| name.value.to_string()).or_else(stem) else { continue };
+            let Some(name) = name_of(&element) else { continue };
             all.insert(name, element);
         }
-        let folder = if strip { PathBuf::new() } else { main.parent().unwrap_or(Path::new("")).join(folder) };
-        Meshes { all, read: RefCell::default(), hulls: RefCell::default(), told: RefCell::default(), folder, files }
+        Meshes { all, read: RefCell::default(), hulls: RefCell::default(), told: RefCell::default(), assets }
     }
 
     /// The body that a mesh bounds; `None` where something was reported, once for each mesh.
@@ -201,14 +186,8 @@ impl<'m, 'd> Meshes<'m, 'd> {
             return Err("a mesh that MuJoCo makes is not read".into());
         }
         let Some(file) = element.attribute("file") else { return inline(reader, element, whose) };
-        let path = Path::new(file.value);
-        if path.is_absolute() || path.has_root() {
-            return Err("its path is not relative to the main file".into());
-        }
-        let path = self.folder.join(path);
-        let bytes = (self.files)(&path).map_err(|error| format!("cannot read {}: {error}", quote(file.value)))?;
-        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
-        match extension.as_deref() {
+        let bytes = self.assets.bytes(file.value)?;
+        match extension(file.value).as_deref() {
             Some("stl") => stl(&bytes),
             Some("msh") => msh(&bytes),
             Some("obj") => obj(&bytes),

@@ -9,11 +9,14 @@
 //! where a joint is anchored elsewhere, a fixed joint leads from the anchor to it.
 
 mod actuator;
+mod assets;
 mod build;
 mod classes;
 mod element;
 mod equality;
 mod geom;
+#[cfg(feature = "height_fields")]
+mod hfield;
 mod include;
 mod inertia;
 mod joint;
@@ -33,7 +36,9 @@ use super::tally::Tally;
 use super::words::quote;
 use super::xml::{place, shown, syntax_error, without_late_declaration, Reader};
 use super::{floor, Base, ImportOptions, ReadFile};
+use assets::Assets;
 use classes::Classes;
+use geom::Solids;
 use joint::Rules;
 use mesh::Meshes;
 use roxmltree::{Document, Node};
@@ -129,8 +134,14 @@ fn read_mujoco<'d>(
         floor::add(floor, &mut shapes, &mut raw);
     }
     let rules = Rules { compiler: &compiler, options: &settings, stops: options.limits };
-    let meshes = Meshes::new(reader, &called("asset"), &called("compiler"), &classes, files);
-    let mut built = build::all(reader, &bodies, rules, (&meshes, shapes), &mut raw);
+    let assets = Assets::new(reader, &called("compiler"), files);
+    let meshes = Meshes::new(reader, &called("asset"), &classes, &assets);
+    let solids = Solids {
+        meshes: &meshes,
+        #[cfg(feature = "height_fields")]
+        fields: &hfield::Fields::new(reader, &called("asset"), &assets, options.floor.is_some()),
+    };
+    let mut built = build::all(reader, &bodies, rules, (solids, shapes), &mut raw);
     meshes.tell(reader);
     touching(reader, root, options, &raw);
     let mut tendons = HashMap::new();

@@ -3,7 +3,7 @@
 
 use super::{base, constraints, contacts, entries, variants, KEYS};
 use crate::import::{hull, Base};
-use crate::model::{Words, JOINTS, LOOPS, SHAPES};
+use crate::model::{Words, JOINTS, LOOPS, SHAPES, SIDES};
 
 /// The definitions that the tables share.
 const DEFINITIONS: &[(&str, &str)] = &[
@@ -137,6 +137,9 @@ fn property(table: &str, key: &str) -> String {
         (_, "spacing") => r#"{ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 }"#.into(),
         (_, "most") => {
             format!("{{ \"type\": \"integer\", \"minimum\": {}, \"maximum\": {} }}", hull::MOST.0, hull::MOST.1)
+        }
+        (_, "sides") => {
+            format!("{{ \"type\": \"integer\", \"minimum\": {}, \"maximum\": {} }}", SIDES.0, SIDES.1)
         }
         (_, "scale") => r#"{ "type": "number", "exclusiveMinimum": true, "minimum": 0 }"#.into(),
         (_, "name" | "parent" | "child" | "body" | "file") => reference("name"),

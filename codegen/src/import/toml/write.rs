@@ -273,6 +273,7 @@ impl Text {
         self.maybe("radius", shape.radius.as_ref().map(number));
         self.maybe("length", shape.length.as_ref().map(number));
         self.maybe("size", shape.size.as_ref().map(|size| list(&size.value)));
+        self.maybe("sides", shape.sides.as_ref().map(number));
         self.maybe("rounding", shape.rounding.as_ref().map(number));
         self.maybe("semi_axes", shape.semi_axes.as_ref().map(|axes| list(&axes.value)));
         self.maybe("normal", shape.normal.as_ref().map(direction));

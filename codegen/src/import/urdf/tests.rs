@@ -248,7 +248,7 @@ fn shapes_are_read_and_touch_a_floor_that_is_asked_for() {
     assert_eq!(free.shapes[1].kind, ShapeKind::Sphere { radius: 0.5 });
     assert_eq!(consts(free.shapes[1].mount.placement.xyz), [1.0, 2.0, 3.0]);
     assert_eq!(free.shapes[1].mount.placement.rotation, Rotation::Rpy([0.1, 0.2, 0.3].map(Value::Const)));
-    assert_eq!(free.shapes[2].kind, ShapeKind::Cylinder { radius: 0.1, length: 0.4 });
+    assert_eq!(free.shapes[2].kind, ShapeKind::Cylinder { radius: 0.1, length: 0.4, sides: None, rounding: 0.0 });
     // The link `ground` is called otherwise here; its shape stays on it.
     let capsule = &free.shapes[3];
     assert_eq!((&capsule.kind, capsule.mount.body), (&ShapeKind::Capsule { radius, length }, Some(1)));
