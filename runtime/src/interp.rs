@@ -147,6 +147,20 @@ impl<S: Scalar> Interpreter<S> {
         sweeps.gaps(q, v, &inputs!(self), &mut self.work, [gaps, velocities, entries]);
     }
 
+    /// [`Interpreter::gaps`] of the constraints any of whose rows is `wanted`, one entry for each row. Numbers of the others
+    /// mean nothing.
+    pub fn gaps_of(
+        &mut self,
+        wanted: &[bool],
+        (q, v): (&[S], &[S]),
+        gaps: &mut [S],
+        velocities: &mut [S],
+        entries: &mut [S],
+    ) {
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.gaps_of(wanted, (q, v), &inputs!(self), &mut self.work, [gaps, velocities, entries]);
+    }
+
     /// Takes the names of the velocities and of the constraints, in their order, for the messages of errors.
     #[must_use]
     pub fn with_names(mut self, velocities: Vec<String>, constraints: Vec<String>) -> Self {

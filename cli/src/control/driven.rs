@@ -202,6 +202,19 @@ impl Reducible for Driven {
     ) {
         self.inner.gaps(q, v, gaps, velocities, entries);
     }
+    fn sees_parts(&self) -> bool {
+        self.inner.sees_parts()
+    }
+    fn gaps_of(
+        &mut self,
+        wanted: &[bool],
+        state: (&Vec<f64>, &Vec<f64>),
+        gaps: &mut Vec<f64>,
+        velocities: &mut Vec<f64>,
+        entries: &mut Vec<f64>,
+    ) {
+        self.inner.gaps_of(wanted, state, gaps, velocities, entries);
+    }
     fn with_implicit_springs(&self, step: f64) -> Option<ImplicitSprings<Self, Vec<f64>>> {
         let found = self.inner.with_implicit_springs(step)?;
         Some(found.map(|inner| Driven { inner, ..self.clone() }))

@@ -285,7 +285,7 @@ impl<S: Number> Compiled<S> {
 
     /// Computes an output that one of the traits asks for, whose arrays are right. Returns whether there is code for
     /// it.
-    #[inline]
+    #[inline(always)]
     pub(super) fn run(&mut self, output: Output, arguments: [&[S]; 3], results: &mut [&mut [S]]) -> bool {
         if self.interprets(output) {
             return false;
@@ -408,6 +408,24 @@ impl<S: Number> Reducible for Compiled<S> {
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
         if !self.run(Output::Gaps, [q, v, &[]], &mut [gaps, velocities, entries]) {
             self.interpreter.gaps(q, v, gaps, velocities, entries);
+        }
+    }
+
+    /// Machine code computes all of them.
+    fn sees_parts(&self) -> bool {
+        self.interpreted || !self.shared.outputs[Output::Gaps as usize].get().is_some_and(Result::is_ok)
+    }
+
+    fn gaps_of(
+        &mut self,
+        wanted: &[bool],
+        (q, v): (&Vec<S>, &Vec<S>),
+        gaps: &mut Vec<S>,
+        velocities: &mut Vec<S>,
+        entries: &mut Vec<S>,
+    ) {
+        if !self.run(Output::Gaps, [q, v, &[]], &mut [gaps, velocities, entries]) {
+            self.interpreter.gaps_of(wanted, (q, v), gaps, velocities, entries);
         }
     }
 

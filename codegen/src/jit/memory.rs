@@ -303,7 +303,7 @@ impl<S: Number> MachineCode<S> {
     ///
     /// # Panics
     /// If a slice has another length than its array, or the working memory is too short.
-    #[inline]
+    #[inline(always)]
     pub fn call(&self, inputs: &impl Inputs<S>, results: &mut [&mut [S]], scratch: &mut [S]) -> bool {
         assert!(scratch.len() >= self.scratch, "the working memory is too short");
         // Few programs read other fields than joint forces, and a call of a small one takes as long as its code. Nothing is

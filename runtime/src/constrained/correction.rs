@@ -88,6 +88,8 @@ struct Noted<S> {
     /// Length of the step, if the end before it is known too.
     step: Option<S>,
     rank: usize,
+    /// Whether there was no independent row at this end and the one before it.
+    still: bool,
 }
 
 /// Corrects positions by a [`Stabilisation`].
@@ -151,6 +153,12 @@ where
             last => last,
         };
         let step = last.map(|last| t - last.t);
+        let still = rank == 0 && last.is_some_and(|last| last.rank == 0);
+        self.noted = Some(Noted { t, step, rank, still });
+        if still && last.is_some_and(|last| last.still) {
+            // All roots are zero, and stay so.
+            return;
+        }
         let (mut found, mut left) = (None, None);
         let [old, older] = &mut self.roots;
         for (row, (pivot, (old, older))) in
@@ -180,7 +188,6 @@ where
             self.singular.0 += 1;
             self.singular.1 = Some(SingularPosition { time: time.to_f64(), constraint, ranks });
         }
-        self.noted = Some(Noted { t, step, rank });
     }
 
     /// Has the system order its rows anew where one of them has lost most of its pivot, at the end of a step that has

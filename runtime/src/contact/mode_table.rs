@@ -12,6 +12,9 @@ use crate::system::{
 };
 use crate::Scalar;
 
+/// Number of contacts up to which all gaps are computed at once: finding out which are far takes as long.
+const FEW: usize = 8;
+
 /// A mechanism whose rows can be taken out of its equations.
 pub trait Reducible: Constrained<Scalar: Real> + Energetic + Conjugate + Sized {
     /// The mechanism in which only some rows act, one entry of `acts` for each row. Its rows have the numbers that they
@@ -36,6 +39,24 @@ pub trait Reducible: Constrained<Scalar: Real> + Energetic + Conjugate + Sized {
         velocities: &mut Self::Rows,
         entries: &mut Self::Entries,
     );
+
+    /// Whether [`Reducible::gaps_of`] takes less than [`Reducible::gaps`] where few rows are asked for.
+    fn sees_parts(&self) -> bool {
+        false
+    }
+
+    /// [`Reducible::gaps`] of the constraints any of whose rows is `wanted`, one entry for each row, at `(q, v)`. Numbers of the
+    /// others mean nothing.
+    fn gaps_of(
+        &mut self,
+        _wanted: &[bool],
+        (q, v): (&Self::Coordinates, &Self::Momenta),
+        gaps: &mut Self::Rows,
+        velocities: &mut Self::Rows,
+        entries: &mut Self::Entries,
+    ) {
+        self.gaps(q, v, gaps, velocities, entries);
+    }
 
     /// The mechanism for steps of `step` s that are implicit in springs and dampers of the joints, with inputs that are zero:
     /// [`Touching::project_implicitly`]. `None` where no joint has a spring or a damper, or there is no such evaluator.
@@ -74,6 +95,21 @@ impl<S: Real> Reducible for Interpreter<S> {
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
         Interpreter::gaps(self, q, v, gaps, velocities, entries);
     }
+
+    fn sees_parts(&self) -> bool {
+        true
+    }
+
+    fn gaps_of(
+        &mut self,
+        wanted: &[bool],
+        (q, v): (&Vec<S>, &Vec<S>),
+        gaps: &mut Vec<S>,
+        velocities: &mut Vec<S>,
+        entries: &mut Vec<S>,
+    ) {
+        Interpreter::gaps_of(self, wanted, (q, v), gaps, velocities, entries);
+    }
 }
 
 /// A mechanism with contacts. An evaluator of the rows that act is made when a set of modes is first met, and kept.
@@ -87,6 +123,8 @@ pub struct ModeTable<Y: Constrained> {
     current: usize,
     contacts: Vec<Contact<Y::Scalar>>,
     reaches: Vec<Reach<Y::Scalar>>,
+    /// The rows of [`Touching::gaps_of`].
+    wanted: Vec<bool>,
     implicit: Option<Implicit<Y>>,
 }
 
@@ -110,8 +148,9 @@ impl<Y: Reducible> ModeTable<Y> {
     pub fn new(full: Y, contacts: Vec<Contact<Y::Scalar>>) -> Self {
         let open = vec![Mode::Open; contacts.len()];
         let first = full.acting(&rows_that_act(full.rows().len(), &contacts, &open));
-        let reaches = full.reaches(&contacts);
-        ModeTable { full, modes: vec![(open, first)], current: 0, contacts, reaches, implicit: None }
+        let (reaches, wanted) = (full.reaches(&contacts), vec![true; full.rows().len()]);
+        let current = 0;
+        ModeTable { full, modes: vec![(open, first)], current, contacts, reaches, wanted, implicit: None }
     }
 
     /// The sets of modes that were met, in the order in which they were.
@@ -309,6 +348,32 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
         self.full.swap_inputs(current);
         self.full.gaps(q, v, gaps, velocities, entries);
         self.full.swap_inputs(current);
+    }
+
+    fn sees_parts(&self) -> bool {
+        self.contacts.len() > FEW && self.full.sees_parts()
+    }
+
+    fn gaps_of(
+        &mut self,
+        of: &[bool],
+        t: Y::Scalar,
+        (q, v): (&Y::Coordinates, &Y::Momenta),
+        gaps: &mut Y::Rows,
+        velocities: &mut Y::Rows,
+        entries: &mut Y::Entries,
+    ) {
+        if !of.contains(&false) {
+            return self.gaps(t, q, v, gaps, velocities, entries);
+        }
+        let ModeTable { full, modes, current, contacts, wanted, .. } = self;
+        for (contact, of) in contacts.iter().zip(of) {
+            wanted[contact.row..][..contact.rows()].fill(*of);
+        }
+        let current = &mut modes[*current].1;
+        full.swap_inputs(current);
+        full.gaps_of(wanted, (q, v), gaps, velocities, entries);
+        full.swap_inputs(current);
     }
 
     fn project_columns(&mut self, t: Y::Scalar, q: &Y::Coordinates, columns: &mut Columns<Y::Scalar>) -> bool {

@@ -62,6 +62,23 @@ pub trait Touching: Constrained<Scalar: Real> {
         velocities: &mut Self::Rows,
         entries: &mut Self::Entries,
     );
+    /// Whether [`Touching::gaps_of`] takes less than [`Touching::gaps`] where few contacts are asked for.
+    fn sees_parts(&self) -> bool {
+        false
+    }
+    /// [`Touching::gaps`] of some contacts, with one entry of `of` for each, and of the rows that are no contacts'. Numbers of
+    /// other contacts mean nothing afterwards: those of all of them may be computed, or not.
+    fn gaps_of(
+        &mut self,
+        _of: &[bool],
+        t: Self::Scalar,
+        (q, v): (&Self::Coordinates, &Self::Momenta),
+        gaps: &mut Self::Rows,
+        velocities: &mut Self::Rows,
+        entries: &mut Self::Entries,
+    ) {
+        self.gaps(t, q, v, gaps, velocities, entries);
+    }
     /// [`Constrained::project_momenta`] of several momenta at one state, for all of whose velocities there is a use; each has the
     /// bits that it has alone. Returns whether that was done: where several are no faster than one after the other, nothing is.
     fn project_columns(

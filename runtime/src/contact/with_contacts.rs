@@ -30,6 +30,8 @@ const UNSURE: f64 = 1e-3;
 pub struct WithContacts<Y: Touching> {
     pub(super) system: Y,
     modes: Y::PerContact<Mode>,
+    /// Whether there are rows that are no contacts': of loops and couplings.
+    loops: bool,
     /// Whether rows of contacts act, by these modes or by those of a solve.
     closed: bool,
     /// Direction of slip where the step began, for contacts that slide.
@@ -45,6 +47,10 @@ pub struct WithContacts<Y: Touching> {
     /// Whether rows of closed contacts depend on one another.
     pub(super) redundant: bool,
     pub(super) at: Contacts<Y>,
+    /// Contacts that [`WithContacts::look`] looks at: all that are not known to be far.
+    minded: Y::PerContact<bool>,
+    /// Contacts that are closed.
+    pressed: Y::PerContact<bool>,
     /// Momenta of the state, freed of multipliers; the response to the friction of a contact.
     pub(super) p: Y::Momenta,
     pub(super) response: Y::Momenta,
@@ -81,8 +87,10 @@ impl<Y: Touching> WithContacts<Y> {
         let modes = system.per_contact(Mode::Open);
         system.act(modes.as_ref());
         let count = system.contacts().len();
+        let of_contacts: usize = system.contacts().iter().map(Contact::rows).sum();
         WithContacts {
             modes,
+            loops: system.rows().len() > of_contacts,
             closed: false,
             slip: system.per_contact([zero; 2]),
             begins: system.per_contact(false),
@@ -98,6 +106,8 @@ impl<Y: Touching> WithContacts<Y> {
                 lambda: rows(&system),
                 forces: system.per_contact([zero; 3]),
             },
+            minded: system.per_contact(true),
+            pressed: system.per_contact(false),
             p: momenta(&system),
             response: momenta(&system),
             response_v: momenta(&system),
@@ -151,8 +161,7 @@ impl<Y: Touching> WithContacts<Y> {
 
     /// Whether there are rows that are no contacts': of loops and couplings.
     pub(super) fn has_loops(&self) -> bool {
-        let of_contacts: usize = self.system.contacts().iter().map(Contact::rows).sum();
-        self.system.rows().len() > of_contacts
+        self.loops
     }
 
     /// Whether all contacts are open.
@@ -163,7 +172,7 @@ impl<Y: Touching> WithContacts<Y> {
     /// Forces of the contacts `[normal, tangential, tangential]`, N (N m for stops of rotations), at a state: on the second
     /// body, the opposite on the first.
     pub fn forces(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> &[[Y::Scalar; 3]] {
-        self.look(t, q, p);
+        self.look_at_closed(t, q, p);
         self.loads(t, q, true);
         self.at.forces.as_ref()
     }
@@ -176,8 +185,14 @@ impl<Y: Touching> WithContacts<Y> {
         self.modes_are_set();
     }
 
-    /// Opens all contacts.
+    /// Opens all contacts, none of which is known to be far.
     pub(super) fn open_all(&mut self) {
+        self.minded.as_mut().fill(true);
+        self.release();
+    }
+
+    /// Opens all contacts at an event.
+    pub(super) fn release(&mut self) {
         self.modes.as_mut().fill(Mode::Open);
         self.begins.as_mut().fill(false);
         self.modes_are_set();
@@ -185,6 +200,9 @@ impl<Y: Touching> WithContacts<Y> {
 
     fn modes_are_set(&mut self) {
         self.near = false;
+        for (pressed, mode) in self.pressed.as_mut().iter_mut().zip(self.modes.as_ref()) {
+            *pressed = *mode != Mode::Open;
+        }
         self.restore();
         self.rubs = (0..self.modes.as_ref().len()).any(|k| self.rubs(k));
     }
@@ -234,11 +252,42 @@ impl<Y: Touching> WithContacts<Y> {
         self.system.project_momenta(t, q, &mut self.p, &mut self.at.v, &mut self.sigma);
     }
 
-    /// Velocities, gaps and their like at a state, in `self.at`.
+    /// Velocities at a state, with gaps and their like of the contacts that are minded, in `self.at`.
     pub(super) fn look(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
         self.free(t, q, p);
         let Contacts { v, gaps, velocities, entries, .. } = &mut self.at;
-        self.system.gaps(t, q, v, gaps, velocities, entries);
+        self.system.gaps_of(self.minded.as_ref(), t, (q, v), gaps, velocities, entries);
+    }
+
+    /// [`WithContacts::look`] at those contacts only that are closed.
+    fn look_at_closed(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
+        self.free(t, q, p);
+        let Contacts { v, gaps, velocities, entries, .. } = &mut self.at;
+        self.system.gaps_of(self.pressed.as_ref(), t, (q, v), gaps, velocities, entries);
+    }
+
+    /// [`WithContacts::look`] at all contacts, all of which are minded then.
+    pub(super) fn look_at_all(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
+        self.minded.as_mut().fill(true);
+        self.look(t, q, p);
+    }
+
+    /// Whether contact `k` is minded.
+    pub(super) fn minds(&self, k: usize) -> bool {
+        get_or(self.minded.as_ref(), k, true)
+    }
+
+    /// Whether all contacts are minded.
+    pub(super) fn minds_all(&self) -> bool {
+        !self.minded.as_ref().contains(&false)
+    }
+
+    /// Minds some contacts from now on, and those that are closed.
+    pub(super) fn mind(&mut self, of: impl Fn(usize) -> bool) {
+        for k in 0..self.minded.as_ref().len() {
+            let minded = self.mode(k) != Mode::Open || of(k);
+            set(self.minded.as_mut(), k, minded);
+        }
     }
 
     /// Gap of contact `k`, m or rad, after [`WithContacts::look`].
@@ -305,7 +354,7 @@ impl<Y: Touching> WithContacts<Y> {
         if !self.rubs {
             return;
         }
-        self.look(t, q, p);
+        self.look_at_closed(t, q, p);
         for k in 0..self.modes.as_ref().len() {
             let begins = self.begins(k) && !(self.speed(k).to_f64() > CREEP);
             set(self.begins.as_mut(), k, begins);
@@ -525,7 +574,7 @@ impl<Y: Touching> System for WithContacts<Y> {
     ) {
         self.system.rates_at(t, q, p, qd, pd);
         if self.rubs {
-            self.look(t, q, p);
+            self.look_at_closed(t, q, p);
             self.loads(t, q, false);
             for (rate, force) in pd.as_mut().iter_mut().zip(self.friction.as_ref()) {
                 *rate = *rate + *force;

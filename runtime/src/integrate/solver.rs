@@ -183,6 +183,11 @@ where
         self.pending.map_or(self.t, |step| step.end)
     }
 
+    /// The state where the last step began, that of the solver if there is none.
+    pub(crate) fn start(&mut self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
+        self.method.parts().0.store(system, q, p);
+    }
+
     /// The state.
     pub fn state(&mut self, system: &Y, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
         let (field, delta) = self.method.parts();
@@ -287,15 +292,17 @@ where
 
     /// Bounds of how far each coordinate has come from where the last step began, at any time within it: twice what its mean
     /// rate gives in the step, and twice what its rates at the start and end give, where these are asked for. With them the
-    /// absolute values of the coordinates where the step began; zero for rotations.
+    /// absolute values of the coordinates where the step began, if `sizes` are asked for; zero for rotations.
     ///
     /// These rates are what the method needs anyway, but for methods that do not start the next step with the rate at the
     /// end of this one.
-    pub(crate) fn travel(&mut self, system: &mut Y, rates: [bool; 2]) -> [&mut Y::Momenta; 2] {
+    pub(crate) fn travel(&mut self, system: &mut Y, rates: [bool; 2], sizes: bool) -> [&mut Y::Momenta; 2] {
         let (two, (t, h)) = (Y::Scalar::constant(2.0), self.last_step());
         let Solver { method, at, size, .. } = self;
         let (field, delta) = method.parts();
-        field.chart().size(system, size);
+        if sizes {
+            field.chart().size(system, size);
+        }
         let further = |x: &mut Y::Scalar, way: Y::Scalar| *x = if way.abs() <= *x { *x } else { way.abs() };
         at.x.as_mut().iter_mut().zip(delta.x.as_ref()).for_each(|(x, delta)| *x = (two * *delta).abs());
         let mut reach = |rate: &Point<Y>| {

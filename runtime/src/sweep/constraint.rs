@@ -157,7 +157,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.trace.at(Some(i), Quantity::Constraint);
         for &(index, side) in &w.constraints.through[i] {
             let constraint = &self.tree.constraints[index];
-            if constraint.is_cut() && (all || !constraint.at_hand()) {
+            let known = constraint.is_cut() && (all || !constraint.at_hand());
+            if known && !w.constraints.left_out[index] {
                 let (rot, pos) = &mut w.constraints.reach[index][side];
                 self.steps(&w.poses, i).iter().for_each(|step| step.pose(rot, pos));
             }
@@ -168,6 +169,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// [`Sweeps::reach_node`] has followed.
     fn set_rows(&self, w: &mut Workspace<S>, all: bool) {
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
+            if w.constraints.left_out[index] {
+                continue;
+            }
             self.trace.at(None, Quantity::Constraint);
             match &constraint.bond {
                 Bond::Cut(cut) => self.cut_rows(index, constraint, cut, w, all || !constraint.at_hand()),
@@ -423,10 +427,16 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         }
     }
 
+    /// The constraints that are not left out, with their numbers.
+    fn wanted<'a>(&'a self, w: &'a Workspace<S>) -> impl Iterator<Item = (usize, &'a Constraint<S>)> {
+        let all = self.tree.constraints.iter().enumerate();
+        all.filter(|(index, _)| !w.constraints.left_out[*index])
+    }
+
     /// Entries of `Φ`, placed as [`Tree::entry_columns`] says, after the rows.
     pub(super) fn row_entries(&self, w: &Workspace<S>, entries: &mut [S]) {
         entries.fill(S::zero());
-        for constraint in &self.tree.constraints {
+        for (_, constraint) in self.wanted(w) {
             let bound = &constraint.velocities;
             self.trace.at(None, Quantity::Constraint);
             for (k, r) in constraint.range().enumerate() {
@@ -458,7 +468,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// their nodes.
     pub(super) fn velocities_of_rows(&self, w: &Workspace<S>, out: &mut [S]) {
         out.fill(S::zero());
-        for (index, constraint) in self.tree.constraints.iter().enumerate() {
+        for (index, constraint) in self.wanted(w) {
             match &constraint.bond {
                 Bond::Cut(cut) => {
                     let at = &w.constraints.relative[index];

@@ -321,6 +321,23 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.row_entries(w, entries);
     }
 
+    /// [`Sweeps::gaps`] of the constraints any of whose rows is `wanted`, one entry for each row. Numbers of the others mean
+    /// nothing.
+    pub fn gaps_of(
+        &self,
+        wanted: &[bool],
+        (q, v): (&[S], &[S]),
+        u: &Inputs<S>,
+        w: &mut Workspace<S>,
+        results: [&mut [S]; 3],
+    ) {
+        for (left_out, constraint) in w.constraints.left_out.iter_mut().zip(&self.tree.constraints) {
+            *left_out = constraint.range().all(|row| wanted.get(row) == Some(&false));
+        }
+        self.gaps(q, v, u, w, results);
+        w.constraints.left_out.fill(false);
+    }
+
     /// Articulated inertia with all freedoms and unknowns eliminated.
     pub fn factor(&self, q: &[S], u: &Inputs<S>, w: &mut Workspace<S>) {
         let given = Arguments::new(q, &[], u);

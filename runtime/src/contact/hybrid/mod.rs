@@ -18,7 +18,7 @@ use super::{ContactError, Effort, Impact, ImpactOrder, Mode, RegimeChange, Touch
 use crate::error::StepError;
 use crate::integrate::{Limits, Solver, Statistics, Step, Stepper};
 use crate::lists::get_or;
-use crate::system::Real;
+use crate::system::{Constrained, Real};
 use crate::Scalar;
 use watch::Watched;
 
@@ -254,7 +254,8 @@ struct Departure<S> {
 /// forces, friction cones and speeds of slip are watched on the dense output; where one of them reaches zero, the step is
 /// cut there, impulses and modes are computed, and the motion starts again. A gap counts as zero where it touches zero
 /// within a step too, which its rate tells. While all contacts are open, gaps are not looked at before the joints have
-/// moved so far that one of them may have closed ([`Touching::reaches`]).
+/// moved so far that one of them may have closed ([`Touching::reaches`]). Of many contacts, those that are far by the same
+/// measure are not computed where a mechanism can do without ([`Touching::sees_parts`]), whether others are closed or not.
 ///
 /// While contacts are closed, momenta collect their multipliers. Events free them of these, so that a contact that opens does not
 /// make velocities of them; between events, a state's momenta and energy contain them unless the method projects
@@ -275,9 +276,16 @@ pub struct Hybrid<Y: Touching, M> {
     end: Y::PerContact<Watched<Y::Scalar>>,
     /// Whether the left end is where the next step starts.
     known: bool,
-    /// What is left of each gap after the travel since it was looked at last, m (rad); travel in the last step.
+    /// What is left of each gap after the travel since it was looked at last, but for that of the joints' moves in `gone`, m
+    /// (rad); travel in the last step.
     reserve: Y::PerContact<Y::Scalar>,
     travel: Y::PerContact<Y::Scalar>,
+    /// How far the joints have moved beyond what was taken off the reserves, and how far they may before these are compared
+    /// again, m or rad.
+    gone: Y::Momenta,
+    allowed: Y::Momenta,
+    /// Whether coordinates add to the arms of rotations.
+    slides: bool,
     departures: Y::PerContact<Departure<Y::Scalar>>,
     touching: Touches<Y>,
     /// Contacts that are left open whatever their gaps are.
@@ -349,6 +357,9 @@ where
             known: false,
             reserve: inner.per_contact(zero),
             travel: inner.per_contact(zero),
+            gone: inner.zero_momenta(),
+            allowed: inner.zero_momenta(),
+            slides: inner.reaches().iter().any(|reach| reach.slide != zero),
             departures: inner.per_contact(departure),
             touching: Touches::new(inner),
             ignored: inner.per_contact(false),
@@ -389,7 +400,7 @@ where
     pub fn resume(&mut self, system: &mut WithContacts<Y>) -> Result<(), HybridError> {
         let t = self.solver.time();
         self.solver.state(system, &mut self.q, &mut self.p);
-        system.look(t, &self.q, &self.p);
+        system.look_at_all(t, &self.q, &self.p);
         self.settle_modes(system, t, None)
     }
 
@@ -449,6 +460,7 @@ where
         if let Some(entry) = self.ignored.as_mut().get_mut(contact) {
             *entry = ignored;
         }
+        self.allowed.as_mut().fill(Y::Scalar::zero());
     }
 
     /// Limits of the work.
@@ -491,9 +503,19 @@ where
     ) -> Result<Option<ContactEvent<Y::Scalar>>, HybridError> {
         let Hybrid { solver, start, .. } = self;
         start.0 = solver.time();
-        solver.state(system, &mut start.1, &mut start.2);
-        system.note_slip(start.0, &start.1, &start.2);
-        solver.advance(system, t_end)?;
+        let held = system.rows_act();
+        if held {
+            solver.state(system, &mut start.1, &mut start.2);
+            system.note_slip(start.0, &start.1, &start.2);
+        }
+        if let Err(error) = solver.advance(system, t_end) {
+            solver.state(system, &mut start.1, &mut start.2);
+            return Err(error.into());
+        }
+        if !held {
+            // The same, without a computation.
+            solver.start(system, &mut start.1, &mut start.2);
+        }
         if let Some(steps) = self.statistics.steps.get_mut(system.system().way() as usize) {
             *steps += 1;
         }

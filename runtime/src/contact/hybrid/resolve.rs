@@ -48,7 +48,7 @@ where
             impact: None,
             rest: None,
         };
-        system.look(t, &self.q, &self.p);
+        system.look_at_all(t, &self.q, &self.p);
         self.free_momenta(system);
         if found.cause == Cause::Slipped {
             system.loads(t, &self.q, true);
@@ -90,7 +90,7 @@ where
         }
     }
 
-    /// Impulses and modes of the contacts that touch at the state that was looked at last, which is in `self.q` and
+    /// Impulses and modes of the contacts that touch at the state at which all were looked at last, which is in `self.q` and
     /// `self.p`; the motion starts again from there.
     pub(in crate::contact) fn settle_modes(
         &mut self,
@@ -99,6 +99,8 @@ where
         event: Option<&mut ContactEvent<Y::Scalar>>,
     ) -> Result<(), HybridError> {
         self.take_touching(system);
+        self.fill_all(system);
+        self.mind_near(system);
         let event = self.collide(system, t, event)?;
         self.stay(system, t, event.as_ref().map(|impact| impact.energy));
         self.select(system, t)?;
@@ -119,7 +121,7 @@ where
             return Err(HybridError::NotFinite { time: t.to_f64() });
         }
         self.evaluate(system, t, false);
-        self.refill();
+        self.refill(system);
         // Slip that begins has the direction of its acceleration while it is slow: the first step ends before it is not.
         let creeps = CREEP / self.slipping.to_f64();
         self.solver.limits.first_step = if creeps < LONGEST { creeps } else { 0.0 };
@@ -183,7 +185,7 @@ where
             event.impact = Some(result);
         }
         // Velocities after the impact, with no contact held.
-        system.open_all();
+        system.release();
         system.look(t, &self.q, &self.p);
         Ok(Some(result))
     }

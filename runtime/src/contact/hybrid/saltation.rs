@@ -140,7 +140,7 @@ where
         let t = self.motion.time();
         let (q, p) = &mut self.near;
         self.motion.state(&self.system, q, p);
-        self.system.look(t, q, p);
+        self.system.look_at_all(t, q, p);
         v.as_mut().copy_from_slice(self.system.at.v.as_ref());
     }
 
@@ -229,7 +229,7 @@ where
     /// The function of an event at the state in `self.near`.
     fn function(&mut self, t: Dual<S>, contact: usize, cause: Cause) -> Dual<S> {
         let Tangent { system, near: (q, p), .. } = self;
-        system.look(t, q, p);
+        system.look_at_all(t, q, p);
         if cause != Cause::Landed {
             system.loads(t, q, true);
         }
@@ -355,7 +355,7 @@ where
     /// Frees the momenta in `self.near` of multipliers, and looks at the state.
     fn project(&mut self, t: Dual<S>) {
         let Tangent { system, near: (q, p), .. } = self;
-        system.look(t, q, p);
+        system.look_at_all(t, q, p);
         p.as_mut().copy_from_slice(system.p.as_ref());
     }
 

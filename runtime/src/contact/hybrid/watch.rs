@@ -90,9 +90,16 @@ where
         if !system.is_open() {
             system.loads(t, &self.q, true);
         }
+        self.watch(system, right);
+    }
+
+    /// Takes the functions of the contacts that are minded where the system was looked at last.
+    pub(super) fn watch(&mut self, system: &WithContacts<Y>, right: bool) {
         let out = if right { &mut self.right } else { &mut self.left };
         for (k, out) in out.as_mut().iter_mut().enumerate() {
-            *out = system.watched(k);
+            if system.minds(k) {
+                *out = system.watched(k);
+            }
         }
     }
 
@@ -136,11 +143,12 @@ where
         }
         self.sample(system, one, true);
         self.rests = system.at_rest();
+        self.travel_with_end(system);
+        let others = self.look_for_others(system);
         // The last stretch ends there too.
         copy(self.end.as_mut(), self.right.as_ref());
-        self.travel_with_end(system);
         let (t, h) = self.solver.last_step();
-        if !known && !(0..self.count(system)).all(|k| self.is_far(k)) {
+        if (!known || others) && !(0..self.count(system)).all(|k| self.is_far(system, k)) {
             let Hybrid { start, q, p, .. } = self;
             copy(q.as_mut(), start.1.as_ref());
             copy(p.as_mut(), start.2.as_ref());
@@ -148,7 +156,7 @@ where
         }
         let Some(turn) = self.turn_of_near(system, h) else {
             self.move_on();
-            self.refill();
+            self.go_on(system, others);
             return Ok(None);
         };
         if !(turn < MOST_STRETCHES) {
@@ -179,10 +187,21 @@ where
             self.move_on();
             from = to;
         }
-        self.refill();
+        self.go_on(system, others);
         match self.creeps(system) {
             Some(contact) => Ok(Some(Found { contact, cause: Cause::Stopped, theta: one })),
             None => self.overloaded(system),
+        }
+    }
+
+    /// The next step starts where the last one ends. `known`: all gaps were looked at there.
+    fn go_on(&mut self, system: &mut WithContacts<Y>, known: bool) {
+        if !known {
+            self.use_up();
+        }
+        self.refill(system);
+        if system.minds_all() {
+            self.mind_near(system);
         }
     }
 
@@ -261,7 +280,7 @@ where
         let (a, b) = (*self.left.as_ref().get(k)?, *self.right.as_ref().get(k)?);
         let (at_a, at_b) = (a.value(which)?, b.value(which)?);
         let mode = system.mode(k);
-        if mode == Mode::Open && self.is_far(k) {
+        if self.is_far(system, k) {
             return None;
         }
         if system.redundant && !system.shares() && mode != Mode::Open && !(mode == Mode::Slide && which == 1) {
