@@ -251,7 +251,7 @@ where
         if self.touching.count > 0 {
             self.collide(system, t + h)?;
             if I::LIFTS && self.lifts {
-                self.lift(system, t + h, half)?;
+                self.lift(system, t + h, half);
             }
             self.drift(system, t + h, half)?;
         } else {
@@ -367,8 +367,8 @@ where
     }
 
     /// Takes bodies apart that would overlap at the end of the step, by velocities of the coordinates alone, which are added
-    /// to `self.v`: momenta stay as they are.
-    fn lift(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, half: Y::Scalar) -> Result<(), HybridError> {
+    /// to `self.v`: momenta stay as they are. Where none are found, the overlap stays for the next step.
+    fn lift(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, half: Y::Scalar) {
         let zero = Y::Scalar::zero();
         let Self { touching, .. } = self;
         let rows = touching.rows();
@@ -388,20 +388,20 @@ where
             }
         }
         if !overlaps {
-            return Ok(());
+            return;
         }
         copy(first_mut(touching.b.as_mut(), rows), touching.work.as_ref());
         touching.problem.as_mut().iter_mut().for_each(|touch| touch.contact.restitution = zero);
         touching.impulses.as_mut().fill(zero);
         let (problem, impulses, work) = touching.parts();
-        I::find(&self.rules, &problem, impulses, work)
-            .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
+        if I::find(&self.rules, &problem, impulses, work).is_err() {
+            return;
+        }
         let (order, impulses) = (touching.order(), touching.impulses.as_ref());
         system.respond_to_impulses((t, &self.q), order, impulses, self.implicit);
         for (v, more) in self.v.as_mut().iter_mut().zip(system.response_v.as_ref()) {
             *v = *v + *more;
         }
-        Ok(())
     }
 }
 
