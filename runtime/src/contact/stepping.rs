@@ -29,7 +29,9 @@ use crate::Scalar;
 use core::marker::PhantomData;
 
 /// Relative residual of impulses that is enough where that of the rules is not reached: steps err by more.
-const RESIDUAL: f64 = 1e-7;
+const RESIDUAL: f64 = 1e-5;
+/// Rounds of sweeps and Newton steps in which the residual of the rules is to be reached.
+const ROUNDS: u32 = 4;
 /// Overlap in the middle of a step that stays, m (rad for stops of rotations), and as a part of what the fastest gap changes by
 /// in the step: what moves fast errs by more.
 const OVERLAP: [f64; 2] = [1e-6, 0.01];
@@ -81,7 +83,7 @@ pub trait StepImpulses {
     ) -> Result<Impact<S>, ContactError>;
 }
 
-/// By the rules: [`impact`]. Impulses that do not reach the residual of the rules are accepted at one of 1e-7.
+/// By the rules: [`impact`]. Impulses that do not reach the residual of the rules are accepted at one of 1e-5.
 #[derive(Clone, Copy, Debug)]
 pub struct ByRules;
 
@@ -94,15 +96,23 @@ impl StepImpulses for ByRules {
         impulses: &mut [S],
         work: &mut [S],
     ) -> Result<Impact<S>, ContactError> {
-        let options = ImpactOptions { effort: rules.effort, order: rules.order };
-        let result = impact_near(problem, &options, impulses, work);
-        match (result, options.effort) {
+        let order = rules.order;
+        let result = impact_near(problem, &ImpactOptions { effort: briefly(rules.effort), order }, impulses, work);
+        match (result, rules.effort) {
             (Err(ContactError::NoConvergence { .. }), Effort::ToTolerance { tolerance, rounds }) => {
                 let effort = Effort::ToTolerance { tolerance: tolerance.max(RESIDUAL), rounds };
-                impact(problem, &ImpactOptions { effort, ..options }, impulses, work)
+                impact(problem, &ImpactOptions { effort, order }, impulses, work)
             }
             _ => result,
         }
+    }
+}
+
+/// The same tolerance with few rounds: what is not found in these is hardly ever found in more.
+fn briefly(effort: Effort) -> Effort {
+    match effort {
+        Effort::ToTolerance { tolerance, rounds } => Effort::ToTolerance { tolerance, rounds: rounds.min(ROUNDS) },
+        Effort::Sweeps(_) => effort,
     }
 }
 
@@ -394,7 +404,8 @@ where
         touching.problem.as_mut().iter_mut().for_each(|touch| touch.contact.restitution = zero);
         touching.impulses.as_mut().fill(zero);
         let (problem, impulses, work) = touching.parts();
-        if I::find(&self.rules, &problem, impulses, work).is_err() {
+        let rules = ContactRules { effort: briefly(self.rules.effort), ..self.rules };
+        if I::find(&rules, &problem, impulses, work).is_err() {
             return;
         }
         let (order, impulses) = (touching.order(), touching.impulses.as_ref());

@@ -148,7 +148,7 @@ fn impulses_never_add_energy() {
         }
         let last = stepped.energy();
         assert!(last < first, "seed {seed}: {first} J, then {last} J");
-        assert!(stepped.statistics().residual <= 1e-7, "{:?}", stepped.statistics());
+        assert!(stepped.statistics().residual <= 1e-5, "{:?}", stepped.statistics());
         assert!(stepped.statistics().overlap < 2e-2, "{:?}", stepped.statistics());
     }
 }
