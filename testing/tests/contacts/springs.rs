@@ -158,7 +158,7 @@ fn loops_stay_closed_in_steps_of_order_two() {
     close(&mut plan.default_interpreter::<f64>(), &mut start, &Closing::default()).unwrap();
     let v = vec![0.0; plan.dims.nv];
     let errors = errors(&leg, (&start, &v), 0.1, [200, 400, 800]);
-    // Oscillations of the springs, which last for two hundredths of a second, are not resolved by the longest steps.
+    // The longest steps err by more than their order says, because the springs are stiff.
     for pair in errors.windows(2) {
         assert!((3.5..5.0).contains(&(pair[0] / pair[1])), "{errors:?}");
     }
