@@ -35,7 +35,8 @@ pub(super) struct Elementary {
 /// Most contacts of a pair.
 pub(super) const MOST: usize = 2000;
 
-/// What a capsule, a box, a hull or a cylinder with sides is: all that lies within a radius of its core, which is a line, a box or a polyhedron.
+/// What a capsule, a box, a hull or a cylinder with sides is: all that lies within a radius of its core, which is a line, a box
+/// or a polyhedron.
 pub(super) struct Rounded {
     radius: f64,
     core: Core,

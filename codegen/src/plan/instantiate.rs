@@ -7,8 +7,7 @@ use mbd_runtime::{Interpreter, Scalar};
 
 use super::placement::rotation;
 use super::structure::{Plan, PlanBond, PlanConstraint, PlanNode, PoseStep, RowsThatAct};
-use crate::model::Param;
-use crate::model::{Gravity, Value};
+use crate::model::{Gravity, Param, Value};
 
 /// A number of the model as a scalar.
 fn value<S: Scalar>(v: Value, params: &[S]) -> S {

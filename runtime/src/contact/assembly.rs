@@ -67,7 +67,7 @@ pub struct ColumnsOf<'a, 'b, S> {
     places: &'a [usize],
 }
 
-/// Tables of modes, which need `alloc`, are what asks for it.
+/// Only tables of modes, which need `alloc`, call this.
 #[cfg(feature = "alloc")]
 impl<'b, S: Real> Columns<'b, S> {
     /// Of a mechanism with such contacts and rows.

@@ -237,8 +237,8 @@ impl<Y: Touching> Touches<Y> {
         found
     }
 
-    /// Acceleration of a row, after [`Touches::find_forces`].
-    pub fn acceleration(&self, row: usize) -> Y::Scalar {
+    /// Acceleration of a row with the forces in `impulses`, after [`Touches::find_forces`], or velocity with the impulses there.
+    pub fn with_impulses(&self, row: usize) -> Y::Scalar {
         let rows = self.rows();
         let (a, b, f) = (self.a.as_ref(), self.b.as_ref(), self.impulses.as_ref());
         (0..rows).fold(get(b, row), |sum, column| sum + get(a, row * rows + column) * get(f, column))

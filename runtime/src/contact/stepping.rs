@@ -8,8 +8,12 @@
 //! A contact takes part where its gap would be closed at the end of the step: `0 ≤ P_n ⊥ v_n + max(g, 0)/(h/2) ≥ 0`, with
 //! its velocity `v_n` after the impulses and its gap `g = g₁ − h v₁/2` in the middle of the step, from gap and rate at the end
 //! without contacts, and Coulomb's law on the exact cone. So what lands does not overlap, but for the curvature of its
-//! path. With restitution, a contact waits until its gap in the middle is closed, and then collides as in an [`impact`];
-//! one whose approach is not faster than twice what forces add in a step has none.
+//! path; what overlaps all the same is taken apart by coordinates alone. With restitution, a contact waits until its gap in
+//! the middle is closed, and then collides as in an [`impact`]; one whose approach is not faster than twice what forces add
+//! in a step has none.
+//!
+//! Springs and dampers of the joints follow the implicit midpoint rule where the mechanism can do that
+//! ([`Touching::steps_implicitly`]), in the motion without contacts as in the answer to impulses.
 //!
 //! The method is of order 1 at impacts and where slip ends, of order 2 in between. Impulses never add energy: their work is
 //! that of an impact with velocities that approach no slower. What friction holds does not move.
@@ -117,7 +121,8 @@ fn briefly(effort: Effort) -> Effort {
 }
 
 /// By exactly `N` sweeps over the contacts, all of which act at once, whatever the residual is and the rules say: for
-/// processors with a fixed time budget, so that overlaps stay. Nothing is allocated, and numbers stay in the precision of the system. A single
+/// processors with a fixed time budget, so that overlaps stay. Nothing is allocated, and numbers stay in the precision of
+/// the system. A single
 /// contact with restitution has the impulses of several: of compression, then of expansion.
 #[derive(Clone, Copy, Debug)]
 pub struct FixedSweeps<const N: u32>;
@@ -287,21 +292,14 @@ where
     /// might close, with their velocities.
     fn take(&mut self, system: &WithContacts<Y>, half: Y::Scalar) {
         let zero = Y::Scalar::zero();
-        let fastest = (0..system.modes().len()).fold(zero, |most, k| {
-            let rate = system.gap_rate(k).abs();
-            if rate > most {
-                rate
-            } else {
-                most
-            }
-        });
+        let fastest = (0..system.modes().len()).fold(zero, |most, k| larger(most, system.gap_rate(k).abs()));
         let near = half * (fastest + fastest);
         self.near = near;
         self.touching.count = 0;
         let mut at = 0;
         for k in 0..system.modes().len() {
             let (rate, c) = (system.gap_rate(k), system.contact(k));
-            let gap = system.gap(k) - half * rate;
+            let gap = middle_gap(system, k, half);
             self.statistics.overlap = larger(self.statistics.overlap, -gap);
             let start = get(self.before.as_ref(), c.row);
             // Forces alone change the rate of the gap by `rate − start` in a step.
@@ -386,15 +384,12 @@ where
         let (least, mut overlaps) = (larger(all, part * self.near), false);
         for i in 0..touching.count {
             let (k, c) = (touching.contact(i), touching.touch(i).contact);
-            let gap = system.gap(k) - half * system.gap_rate(k);
+            let gap = middle_gap(system, k, half);
             overlaps |= gap < -least;
             for row in c.row..c.row + c.rows() {
-                // Velocities after the impulses, and what is ahead.
-                let after = (0..rows).fold(get(touching.b.as_ref(), row), |sum, column| {
-                    sum + get(touching.a.as_ref(), row * rows + column) * get(touching.impulses.as_ref(), column)
-                });
                 let ahead = if gap < zero { gap / half } else { zero };
-                set(touching.work.as_mut(), row, if row == c.row { after + ahead } else { zero });
+                let asked = if row == c.row { touching.with_impulses(row) + ahead } else { zero };
+                set(touching.work.as_mut(), row, asked);
             }
         }
         if !overlaps {
@@ -414,6 +409,11 @@ where
             *v = *v + *more;
         }
     }
+}
+
+/// Gap of contact `k` in the middle of the step, m or rad, from gap and rate at its end without contacts.
+fn middle_gap<Y: Touching>(system: &WithContacts<Y>, k: usize, half: Y::Scalar) -> Y::Scalar {
+    system.gap(k) - half * system.gap_rate(k)
 }
 
 /// The larger of two numbers, of which the second may be none.

@@ -397,7 +397,7 @@ impl<Y: Touching> WithContacts<Y> {
         let largest = f.iter().fold(zero, |most, x| if x.abs() > most { x.abs() } else { most });
         let [n, mut x, mut y] = [get(f, c.row), -get(f, c.row + 1), -get(f, c.row + 2)];
         if !(n > Y::Scalar::constant(UNSURE) * largest) {
-            (x, y) = (instant.acceleration(c.row + 1), instant.acceleration(c.row + 2));
+            (x, y) = (instant.with_impulses(c.row + 1), instant.with_impulses(c.row + 2));
         }
         let size = (x * x + y * y).sqrt();
         if size > zero {

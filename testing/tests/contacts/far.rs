@@ -9,7 +9,7 @@ use mbd_codegen::model::JointKind;
 use mbd_codegen::options::Options;
 use mbd_codegen::plan::Plan;
 use mbd_runtime::catalogue::{self, BoxedMethod};
-use mbd_runtime::constrained::{close, Closing, Effort, Projection, Stabilisation, WithPostStep};
+use mbd_runtime::constrained::{Effort, Projection, Stabilisation, WithPostStep};
 use mbd_runtime::contact::{
     Contact, ContactEvent, ContactObserver, Hybrid, ModeTable, Reach, Reducible, Touching, Way, WithContacts,
 };
@@ -21,7 +21,7 @@ use mbd_testing::random::with_contacts;
 use mbd_testing::state::random_state;
 use mbd_testing::toml::to_toml;
 
-use super::scene::{model, Scene};
+use super::scene::{closed_start, model, Scene};
 
 /// A mechanism that counts the sweeps over it.
 #[derive(Clone, Debug)]
@@ -289,8 +289,7 @@ name = "touch"
 between = ["floor", "tip"]
 "#;
     let plan = Plan::new(&model(&format!("{text}{floor}")), 1e-9);
-    let (mut q, v) = (plan.start(), vec![0.0; plan.dims.nv]);
-    close(&mut plan.default_interpreter::<f64>(), &mut q, &Closing::default()).unwrap();
+    let (q, v) = (closed_start(&plan), vec![0.0; plan.dims.nv]);
     (plan, q, v)
 }
 

@@ -3,7 +3,7 @@
 use mbd_codegen::model::Model;
 use mbd_codegen::plan::Plan;
 use mbd_codegen::read;
-use mbd_runtime::constrained::{Effort, Projection, Stabilisation, WithPostStep};
+use mbd_runtime::constrained::{close, Closing, Effort, Projection, Stabilisation, WithPostStep};
 use mbd_runtime::contact::{
     ContactEvent, ContactInterpreter, ContactObserver, Hybrid, HybridError, ImpactOrder, Touching, WithContacts,
 };
@@ -113,6 +113,13 @@ impl Scene {
         let (kinetic, potential) = self.system.energies(&self.q, &self.p);
         kinetic + potential
     }
+}
+
+/// The start of a model, with its loops closed.
+pub fn closed_start(plan: &Plan) -> Vec<f64> {
+    let mut q = plan.start();
+    close(&mut plan.default_interpreter::<f64>(), &mut q, &Closing::default()).unwrap();
+    q
 }
 
 /// A model from its text.

@@ -2,9 +2,8 @@
 
 use mbd_codegen::model::Model;
 use mbd_codegen::plan::Plan;
-use mbd_runtime::constrained::{close, Closing};
 
-use super::scene::{model, Scene};
+use super::scene::{closed_start, model, Scene};
 use super::stepping::{shipped, Stepped};
 
 const HOP: &str = include_str!("../../../models/contacts/quadruped_hop.toml");
@@ -154,8 +153,7 @@ fn loops_stay_closed_in_steps_of_order_two() {
     "#;
     let leg = model(&(include_str!("../../../models/mechanisms/spring_leg.toml").to_owned() + floor));
     let plan = Plan::new(&leg, 1e-9);
-    let mut start = plan.start();
-    close(&mut plan.default_interpreter::<f64>(), &mut start, &Closing::default()).unwrap();
+    let start = closed_start(&plan);
     let v = vec![0.0; plan.dims.nv];
     let errors = errors(&leg, (&start, &v), 0.1, [200, 400, 800]);
     // The longest steps err by more than their order says, because the springs are stiff.

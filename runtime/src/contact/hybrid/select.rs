@@ -80,7 +80,7 @@ where
             let cause = self.forced.filter(|(contact, ..)| *contact == k).map(|(_, cause, _)| cause);
             // Where the force has just gone to zero, the acceleration starts from zero too.
             let released = cause == Some(Cause::Unloaded);
-            if get(touching.impulses.as_ref(), c.row) <= unloaded && (released || touching.acceleration(c.row) > still)
+            if get(touching.impulses.as_ref(), c.row) <= unloaded && (released || touching.with_impulses(c.row) > still)
             {
                 continue;
             }
@@ -93,7 +93,7 @@ where
                 set(touching.begins.as_mut(), k, cause == Some(Cause::Slipped));
                 continue;
             }
-            let [x, y] = [touching.acceleration(c.row + 1), touching.acceleration(c.row + 2)];
+            let [x, y] = [touching.with_impulses(c.row + 1), touching.with_impulses(c.row + 2)];
             let along = (x * x + y * y).sqrt();
             if along > still {
                 set(touching.slip.as_mut(), k, [x / along, y / along]);
