@@ -12,7 +12,6 @@ use crate::output::{Output, FIELDS};
 pub(super) struct Several<S> {
     state: [Vec<S>; 5],
     fields: [Vec<S>; FIELDS.len()],
-    one: Vec<S>,
 }
 
 /// Columns for which vectors are worth filling.
@@ -36,15 +35,15 @@ impl Compiled<f64> {
         let shared = self.shared.clone();
         let Ok(code) = shared.in_lanes(Output::ProjectMomenta, L) else { return false };
         let mut several = std::mem::take(&mut self.several);
-        let Several { state: [coordinates, p, v, free, sigma], fields, one } = &mut several;
+        let Several { state: [coordinates, p, v, free, sigma], fields } = &mut several;
         coordinates.clear();
         coordinates.extend(q.iter().flat_map(|x| [*x; L]));
         let (nv, rows) = (shared.sizes().nv, shared.sizes().rows);
-        one.resize(nv, 0.0);
         for (all, len) in [(&mut *p, nv), (&mut *v, nv), (&mut *free, nv), (&mut *sigma, rows)] {
             all.resize(L * len, 0.0);
         }
-        for (to, from) in fields.iter_mut().zip(self.fields()) {
+        let read = if code.reads_more() { FIELDS.len() } else { 1 };
+        for (to, from) in fields.iter_mut().zip(self.fields()).take(read) {
             to.clear();
             to.extend(from.iter().flat_map(|x| [*x; L]));
         }
@@ -53,10 +52,7 @@ impl Compiled<f64> {
         }
         let mut done = true;
         for begin in (0..count).step_by(L) {
-            for lane in 0..L.min(count - begin) {
-                columns.momenta(begin + lane, one);
-                p.iter_mut().skip(lane).step_by(L).zip(&*one).for_each(|(to, from)| *to = *from);
-            }
+            columns.momenta::<L>(begin, p);
             let mut given: [&[f64]; INPUTS] = [&[]; INPUTS];
             (given[0], given[1]) = (&coordinates[..], &p[..]);
             given[ARGUMENTS..].iter_mut().zip(&*fields).for_each(|(to, from)| *to = from);
@@ -65,10 +61,7 @@ impl Compiled<f64> {
             if !done {
                 break;
             }
-            for lane in 0..L.min(count - begin) {
-                one.iter_mut().zip(v.iter().skip(lane).step_by(L)).for_each(|(to, from)| *to = *from);
-                columns.take(begin + lane, one);
-            }
+            columns.take::<L>(begin, v);
         }
         self.several = several;
         done

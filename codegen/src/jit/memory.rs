@@ -292,6 +292,12 @@ impl<S: Number> MachineCode<S> {
         self.scratch
     }
 
+    /// Whether the code reads fields other than the first one.
+    #[inline]
+    pub fn reads_more(&self) -> bool {
+        self.more
+    }
+
     /// Whether gravity, the last of the fields, is an input.
     #[inline]
     pub fn reads_gravity(&self) -> bool {

@@ -1,8 +1,9 @@
 //! Velocities for forces of contacts: their inverse inertia `A = Φ M⁻¹Φᵀ` at a state, and its like.
 
-use super::touching::{add_entries, add_row, along_entries, along_row};
+use super::touching::{add_row, along_row};
 use super::{Contact, Mode, Touch, Touching, WithContacts};
-use crate::lists::{copy, get, set};
+use crate::constrained::rows::row;
+use crate::lists::{copy, get, part, set};
 use crate::system::{Real, Row};
 use crate::Scalar;
 
@@ -87,23 +88,28 @@ impl<S: Real> ColumnsOf<'_, '_, S> {
         1 + lines(self.contacts, self.columns.of).count()
     }
 
-    /// Writes the momenta of column `i`.
-    pub fn momenta(&self, i: usize, p: &mut [S]) {
+    /// Writes the momenta of `L` columns from column `i` on, side by side: `L` numbers for each velocity, zeros after the last.
+    pub fn momenta<const L: usize>(&self, i: usize, p: &mut [S]) {
         p.fill(S::zero());
-        if let Some(line) = i.checked_sub(1).and_then(|i| lines(self.contacts, self.columns.of).nth(i)) {
-            Places { rows: self.rows, columns: self.places, entries: self.columns.entries }.unit_force(line, p);
+        let places = Places { rows: self.rows, columns: self.places, entries: self.columns.entries };
+        // The first column is zero.
+        for (line, lane) in lines(self.contacts, self.columns.of).skip(i.max(1) - 1).zip(usize::from(i == 0)..L) {
+            places.unit_force::<L>(line, lane, p);
         }
     }
 
-    /// Takes the velocities of column `i`, after those of the first one; they are changed.
-    pub fn take(&mut self, i: usize, v: &mut [S]) {
+    /// Takes the velocities of `L` columns from column `i` on, which come side by side, after those of the first one; they are
+    /// changed.
+    pub fn take<const L: usize>(&mut self, i: usize, v: &mut [S]) {
         let ColumnsOf { rows, places, contacts, columns: Columns { of, entries, a, own, rest } } = self;
         let places = Places { rows, columns: places, entries };
-        let Some(i) = i.checked_sub(1) else { return copy(rest, v) };
-        let count = lines(contacts, *of).count();
-        if let Some(line) = lines(contacts, *of).nth(i) {
-            places.take_answer((i, count, line), lines(contacts, *of), (rest, v), (a, own));
+        if i == 0 {
+            for (rest, v) in rest.iter_mut().zip(v.chunks_exact(L)) {
+                *rest = get(v, 0);
+            }
         }
+        let count = lines(contacts, *of).count();
+        places.take_answers::<L>((i, count), lines(contacts, *of), (rest, v), (a, own));
     }
 }
 
@@ -115,34 +121,61 @@ struct Places<'a, S> {
     entries: &'a [S],
 }
 
-impl<S: Real> Places<'_, S> {
-    /// Adds the momenta of a unit force of a line.
+impl<'a, S: Real> Places<'a, S> {
+    /// Adds the momenta of a unit force of a line to those of one of `L` columns.
     #[inline(always)]
-    fn unit_force(self, line: Line<S>, p: &mut [S]) {
-        for (row, force) in line.forces(S::one()) {
-            add_entries(self.rows, self.columns, self.entries, row, force, p);
+    fn unit_force<const L: usize>(self, line: Line<S>, lane: usize, p: &mut [S]) {
+        for (r, force) in line.forces(S::one()) {
+            for (column, entry) in self.row(r) {
+                if let Some(p) = p.get_mut(*column * L + lane) {
+                    *p = *p + *entry * force;
+                }
+            }
         }
     }
 
-    /// Takes the velocities that line `i` of `count` answers with, beyond those at rest, into its column of `a` and into `own`.
+    /// Takes the velocities that `L` columns from column `i` on answer with, beyond those at rest, into `a` and `own`: column 0
+    /// is that at rest, those of `count` lines follow.
     #[inline(always)]
-    fn take_answer(
+    fn take_answers<const L: usize>(
         self,
-        (i, count, line): (usize, usize, Line<S>),
+        (i, count): (usize, usize),
         all: impl Iterator<Item = Line<S>>,
         (rest, v): (&[S], &mut [S]),
         (a, own): (&mut [S], &mut [S]),
     ) {
-        for (v, rest) in v.iter_mut().zip(rest) {
-            *v = *v - *rest;
+        if i + L <= 1 {
+            return;
         }
-        let along = |row: usize| along_entries(self.rows, self.columns, self.entries, row, v);
-        for (other, a) in all.zip(a.iter_mut().skip(i).step_by(count.max(1))) {
-            *a = along(other.row);
+        for (v, rest) in v.chunks_exact_mut(L).zip(rest) {
+            v.iter_mut().for_each(|v| *v = *v - *rest);
         }
-        if let Some(own) = own.get_mut(i) {
-            *own = line.forces(S::one()).fold(S::zero(), |sum, (row, force)| sum + force * along(row));
+        let along = |r: usize| {
+            let mut sums = [S::zero(); L];
+            for (column, entry) in self.row(r) {
+                for (sum, v) in sums.iter_mut().zip(part(v, *column * L, L)) {
+                    *sum = *sum + *entry * *v;
+                }
+            }
+            sums
+        };
+        let from = usize::from(i == 0);
+        for (k, (line, a)) in all.zip(a.chunks_exact_mut(count.max(1))).enumerate() {
+            let answers = along(line.row);
+            for (a, answer) in a.iter_mut().skip(i + from - 1).zip(answers.iter().skip(from)) {
+                *a = *answer;
+            }
+            let lane = (k + 1).wrapping_sub(i);
+            if let (true, Some(own)) = (lane < L, own.get_mut(k)) {
+                *own = line.forces(S::one()).fold(S::zero(), |sum, (r, force)| sum + force * get(&along(r), lane));
+            }
         }
+    }
+
+    /// Columns and entries of a row.
+    fn row(self, r: usize) -> impl Iterator<Item = (&'a usize, &'a S)> {
+        let none = Row { constraint: 0, holonomic: false, first: 0, len: 0 };
+        row(self.rows.get(r).unwrap_or(&none), self.columns, self.entries)
     }
 }
 
@@ -180,10 +213,15 @@ impl<Y: Touching> WithContacts<Y> {
             let Some(line) = lines(system.contacts(), of).nth(i) else { return };
             response.as_mut().fill(Y::Scalar::zero());
             let places = Places { rows: system.rows(), columns: system.entry_columns(), entries: at.entries.as_ref() };
-            places.unit_force(line, response.as_mut());
+            places.unit_force::<1>(line, 0, response.as_mut());
             system.project_momenta(t, q, response, response_v, sigma);
             let places = Places { rows: system.rows(), columns: system.entry_columns(), entries: at.entries.as_ref() };
-            places.take_answer((i, count, line), lines(system.contacts(), of), (rest, response_v.as_mut()), (a, own));
+            places.take_answers::<1>(
+                (i + 1, count),
+                lines(system.contacts(), of),
+                (rest, response_v.as_mut()),
+                (a, own),
+            );
         }
     }
 

@@ -433,9 +433,9 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
         let mut of = columns.of(contacts, full.rows(), full.entry_columns());
         if !evaluator.project_several(t, q, &mut of) {
             for i in 0..of.count() {
-                of.momenta(i, p.as_mut());
+                of.momenta::<1>(i, p.as_mut());
                 evaluator.project_momenta(t, q, p, v, sigma);
-                of.take(i, v.as_mut());
+                of.take::<1>(i, v.as_mut());
             }
         }
         evaluator.swap_inputs(current);

@@ -5,10 +5,11 @@
 //! velocities that they add leads to the end (J. J. Moreau, Numerical aspects of the sweeping process, Comput. Methods
 //! Appl. Mech. Eng. 177, 1999).
 //!
-//! A contact takes part where its gap would be closed at the end of the step: `0 ≤ P_n ⊥ v_n + max(g, 0)/(h/2) ≥ 0`, with
-//! its velocity `v_n` after the impulses and its gap `g = g₁ − h v₁/2` in the middle of the step, from gap and rate at the end
-//! without contacts, and Coulomb's law on the exact cone. So what lands does not overlap, but for the curvature of its
-//! path; what overlaps all the same is taken apart by coordinates alone. With restitution, a contact waits until its gap in
+//! A contact takes part where its gap would be closed before the middle of the next step: `0 ≤ P_n ⊥ v_n + max(g, 0)/h ≥ 0`,
+//! with its velocity `v_n` after the impulses and its gap `g = g₁ − h v₁/2` in the middle of the step, from gap and rate at the
+//! end without contacts, and Coulomb's law on the exact cone. What lands between the middles of two steps gets a part of its
+//! impulse in each, so that the time of both, in the mean, is that at which it lands. So it does not overlap, but for the
+//! curvature of its path; what overlaps all the same is taken apart by coordinates alone. With restitution, a contact waits until its gap in
 //! the middle is closed, and then collides as in an [`impact`]; one whose approach is not faster than twice what forces add
 //! in a step has none.
 //!
@@ -304,7 +305,7 @@ where
             let start = get(self.before.as_ref(), c.row);
             // Forces alone change the rate of the gap by `rate − start` in a step.
             let bounces = self.bounces && c.restitution > zero && start < (rate - start) + (rate - start);
-            let ahead = if bounces || !(gap > zero) { zero } else { gap / half };
+            let ahead = if bounces || !(gap > zero) { zero } else { gap / (half + half) };
             if (bounces && gap > zero) || !(rate + ahead < zero || gap < near) {
                 continue;
             }

@@ -48,8 +48,13 @@ pub(super) fn mass<S: Real>(problem: &Problem<S>, touch: &Touch<S>) -> S {
     }
 }
 
-/// The contact with the largest residual, and that residual relative to the largest impulse.
-pub(super) fn residual<S: Real>(terms: &Terms<S>, impulses: &[S]) -> (usize, S) {
+/// The contact with the largest residual, and that residual relative to the largest impulse; `velocity(touch, row)` is that of
+/// a row.
+pub(super) fn residual<S: Real>(
+    terms: &Terms<S>,
+    impulses: &[S],
+    velocity: impl Fn(&Touch<S>, usize) -> S,
+) -> (usize, S) {
     let Terms { problem, least, .. } = *terms;
     let zero = S::zero();
     let (mut worst, mut size) = ((0, zero), zero);
@@ -58,7 +63,7 @@ pub(super) fn residual<S: Real>(terms: &Terms<S>, impulses: &[S]) -> (usize, S) 
         let (row, mass) = (c.row, mass(problem, touch));
         let at = |k: usize| {
             if k < c.rows() {
-                (get(impulses, row + k), terms.velocity(touch, row + k, impulses))
+                (get(impulses, row + k), velocity(touch, row + k))
             } else {
                 (zero, zero)
             }

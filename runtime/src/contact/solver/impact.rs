@@ -84,8 +84,7 @@ pub fn impact<S: Real>(
     judged(problem, impulses, result)
 }
 
-/// [`impact`] from impulses that solve a problem nearby: without restitution and all at once, steps of Newton's method begin
-/// there. One contact alone is solved exactly, wherever the search begins.
+/// [`impact`] from impulses that solve a problem nearby: without restitution and all at once, the search begins there. One contact alone is solved exactly, wherever the search begins.
 ///
 /// # Errors
 /// As of [`impact`].
@@ -99,7 +98,6 @@ pub(in crate::contact) fn impact_near<S: Real>(
     if !known || bounces(problem) || options.order == ImpactOrder::Sequential {
         return impact(problem, options, impulses, work);
     }
-    finite(problem)?;
     let certificate = solve_near(problem, options.effort, impulses, work)?;
     judged(problem, impulses, Impact { certificate, ..Impact::none() })
 }

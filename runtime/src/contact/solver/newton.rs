@@ -1,125 +1,163 @@
 //! A step of Newton's method on the projection equations of Alart and Curnier (1991), for all contacts at once.
 
-use super::{cone, Terms, Touch};
-use crate::lists::{copy, first_mut, get, part, part_mut, set, split, swap};
+use super::{cone, velocities, Terms, Touch};
+use crate::lists::{first_mut, get, part, part_mut, set, split, swap};
 use crate::system::Real;
 
 /// Added to the diagonal of equations for velocities: where contacts are redundant their matrix is singular, and any of
 /// the solutions is wanted.
 const PROXIMAL: f64 = 1e-10;
-/// Largest number of halvings of a step.
-const HALVINGS: u32 = 5;
 
-/// Improves the impulses, whose relative residual is `residual`; `false` where the step does not reduce it. `work` has
-/// room for a square matrix and three lists.
-pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], residual: S, work: &mut [S]) -> bool {
+/// Takes a full step: contacts whose bodies part lose their impulses, and the equations of the others are linear ones in
+/// theirs. `false` where these are singular. `work` begins with the velocities of the impulses, and has room for two more lists
+/// and a square matrix.
+pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], work: &mut [S]) -> bool {
     let n = impulses.len();
-    let (matrix, rest) = split(work, n * n);
-    let (step, rest) = split(rest, n);
-    let start = first_mut(rest, n);
-    matrix.fill(S::zero());
+    let (v, rest) = split(work, n);
+    let (acts, rest) = split(rest, n);
+    let (step, matrix) = split(rest, n);
+    let mut count = 0;
     for touch in terms.problem.touches {
-        equations(terms, touch, impulses, matrix, step);
+        let c = touch.contact;
+        let acting = touch.slip.is_some() || get(terms.least, c.row) > S::zero() || pressed(terms, touch, impulses, v);
+        set(acts, c.row, if acting { S::one() } else { S::zero() });
+        if acting {
+            count += c.rows();
+            continue;
+        }
+        // Nothing but these impulses changes, so that the others' velocities can follow at once.
+        let least = get(terms.least, c.row);
+        for k in 0..c.rows() {
+            let (row, to) = (c.row + k, if k == 0 { least } else { S::zero() });
+            let change = to - get(impulses, row);
+            if change != S::zero() || change.derivative().is_some() {
+                for (v, a) in v.iter_mut().zip(part(terms.problem.a, row * n, n)) {
+                    *v = *v + *a * change;
+                }
+                set(impulses, row, to);
+            }
+        }
+    }
+    let (matrix, step) = (first_mut(matrix, count * count), first_mut(step, count));
+    let acting = |touch: &&Touch<S>| get(acts, touch.contact.row) > S::zero();
+    let mut at = 0;
+    for touch in terms.problem.touches.iter().filter(acting) {
+        let rows = touch.contact.rows();
+        let (lines, rhs) = (part_mut(matrix, at * count, rows * count), part_mut(step, at, rows));
+        let all = terms.problem.touches.iter().filter(acting);
+        equations(terms, (touch, at), all, (impulses, v), lines, rhs);
+        at += rows;
     }
     if !eliminate(matrix, step) {
         return false;
     }
-    copy(start, impulses);
-    let mut part = S::one();
-    for _ in 0..HALVINGS {
-        for ((p, start), step) in impulses.iter_mut().zip(start.iter()).zip(step.iter()) {
-            *p = *start - part * *step;
+    let mut steps = step.iter();
+    for touch in terms.problem.touches.iter().filter(acting) {
+        let own = part_mut(impulses, touch.contact.row, touch.contact.rows());
+        for (p, step) in own.iter_mut().zip(&mut steps) {
+            *p = *p - *step;
         }
-        let (_, now) = cone::residual(terms, impulses);
-        if now < residual {
-            return true;
-        }
-        part = S::constant(0.5) * part;
     }
-    copy(impulses, start);
-    false
+    true
+}
+
+/// Whether a contact presses bodies together by more than the least impulse.
+fn pressed<S: Real>(terms: &Terms<S>, touch: &Touch<S>, impulses: &[S], v: &[S]) -> bool {
+    let row = touch.contact.row;
+    let p = get(impulses, row);
+    p - cone::mass(terms.problem, touch) * get(v, row) > get(terms.least, row)
+}
+
+/// The equations of a contact, `F(P) = 0`, in `rhs`, and their derivatives by the impulses of the contacts that act, in `lines`;
+/// its own begin `at` a place.
+fn equations<'a, S: Real>(
+    terms: &Terms<S>,
+    (touch, at): (&Touch<S>, usize),
+    all: impl Iterator<Item = &'a Touch<S>>,
+    (impulses, v): (&[S], &[S]),
+    lines: &mut [S],
+    rhs: &mut [S],
+) where
+    S: 'a,
+{
+    let (zero, one) = (S::zero(), S::one());
+    let problem = terms.problem;
+    let (n, c) = (problem.b.len(), touch.contact);
+    let count = (lines.len() / c.rows()).max(1);
+    let (row, mass, more) = (c.row, cone::mass(problem, touch), terms.proximal(touch));
+    let (least, friction) = (get(terms.least, row), c.friction);
+    let prox = S::constant(PROXIMAL);
+    let p: [S; 3] = core::array::from_fn(|i| if i < c.rows() { get(impulses, row + i) } else { zero });
+    let u: [S; 3] = core::array::from_fn(|i| if i < c.rows() { get(v, row + i) } else { zero });
+    let normal = p[0] - mass * u[0];
+    let presses = normal > least;
+    // Each line is a sum of those of `m A`, with `from` for the three rows, and of `own` at the contact's impulses.
+    let mut from = [[zero; 3]; 3];
+    let mut own = [[zero; 3]; 3];
+    let mut residual = [if presses { mass * u[0] } else { p[0] - least }, zero, zero];
+    if presses {
+        (from[0][0], own[0][0]) = (mass, prox);
+    } else {
+        own[0][0] = one;
+    }
+    if let (true, Some(slip)) = (c.tangents, touch.slip) {
+        for (i, slip) in [1, 2].into_iter().zip(slip) {
+            residual[i] = p[i] + friction * p[0] * slip;
+            (own[i][i], own[i][0]) = (one, friction * slip);
+        }
+    } else if c.tangents {
+        let radius = friction * if presses { normal } else { least };
+        let z = [p[1] - mass * u[1], p[2] - mass * u[2]];
+        let size = cone::length(z);
+        for (i, along) in [1, 2].into_iter().zip(z) {
+            if size <= radius {
+                residual[i] = mass * u[i];
+                (from[i][i], own[i][i]) = (mass, prox);
+                continue;
+            }
+            let (unit, part) = (along / size, radius / size);
+            residual[i] = p[i] - part * along;
+            own[i][i] = one;
+            // Derivatives of the direction, and of the radius, by impulses: of `P − m v`.
+            for (j, other) in [1, 2].into_iter().zip(z) {
+                let turned = part * (if i == j { one } else { zero } - unit * (other / size));
+                from[i][j] = mass * turned;
+                own[i][j] = own[i][j] - turned;
+            }
+            if presses {
+                from[i][0] = mass * friction * unit;
+                own[i][0] = -(friction * unit);
+            }
+        }
+    }
+    let mut column = 0;
+    for other in all {
+        for j in other.contact.row..other.contact.row + other.contact.rows() {
+            let a: [S; 3] =
+                core::array::from_fn(|i| if i < c.rows() { get(problem.a, (row + i) * n + j) } else { zero });
+            for (line, from) in lines.chunks_exact_mut(count).zip(&from) {
+                set(line, column, from[0] * a[0] + from[1] * a[1] + from[2] * a[2]);
+            }
+            column += 1;
+        }
+    }
+    for (i, line) in lines.chunks_exact_mut(count).enumerate() {
+        set(rhs, i, get(&residual, i));
+        for (k, entry) in part_mut(line, at, c.rows()).iter_mut().enumerate() {
+            // The proximal term is on the diagonal of `A`.
+            let of_own = own.get(i).map_or(zero, |own| get(own, k));
+            *entry = *entry + of_own + from.get(i).map_or(zero, |from| get(from, k)) * more;
+        }
+    }
 }
 
 /// Derivatives of impulses whose values are a solution: full steps, the second of which takes away what the small addition
 /// to the diagonal leaves. `false` where the equations are singular.
 pub(super) fn differentiate<S: Real>(terms: &Terms<S>, impulses: &mut [S], work: &mut [S]) -> bool {
-    let n = impulses.len();
-    let (matrix, rest) = split(work, n * n);
-    let step = first_mut(rest, n);
     (0..2).all(|_| {
-        matrix.fill(S::zero());
-        for touch in terms.problem.touches {
-            equations(terms, touch, impulses, matrix, step);
-        }
-        let solved = eliminate(matrix, step);
-        for (p, step) in impulses.iter_mut().zip(step.iter()) {
-            *p = *p - *step;
-        }
-        solved
+        velocities(terms, impulses, first_mut(work, impulses.len()));
+        step(terms, impulses, work)
     })
-}
-
-/// The equations of a contact, `F(P) = 0`, in `step`, and their derivatives in its rows of `matrix`.
-fn equations<S: Real>(terms: &Terms<S>, touch: &Touch<S>, impulses: &[S], matrix: &mut [S], step: &mut [S]) {
-    let (zero, one) = (S::zero(), S::one());
-    let problem = terms.problem;
-    let (n, c) = (problem.b.len(), touch.contact);
-    let (row, mass, more) = (c.row, cone::mass(problem, touch), terms.proximal(touch));
-    let (least, friction) = (get(terms.least, row), c.friction);
-    let a = |i: usize, j: usize| {
-        let own = get(problem.a, i * n + j);
-        mass * if i == j { own + more } else { own }
-    };
-    let (p, v) = (get(impulses, row), terms.velocity(touch, row, impulses));
-    let normal = p - mass * v;
-    let pressed = normal > least;
-    let prox = S::constant(PROXIMAL);
-    let line = part_mut(matrix, row * n, n);
-    for (j, entry) in line.iter_mut().enumerate() {
-        *entry = if pressed { a(row, j) } else { zero };
-    }
-    let own = if pressed { get(line, row) + prox } else { one };
-    set(line, row, own);
-    set(step, row, if pressed { mass * v } else { p - least });
-    if !c.tangents {
-        return;
-    }
-    let x: [S; 2] = core::array::from_fn(|i| get(impulses, row + 1 + i));
-    let u: [S; 2] = core::array::from_fn(|i| terms.velocity(touch, row + 1 + i, impulses));
-    if let Some(slip) = touch.slip {
-        for i in 0..2 {
-            set(step, row + 1 + i, x[i] + friction * p * slip[i]);
-            set(matrix, (row + 1 + i) * n + row + 1 + i, one);
-            set(matrix, (row + 1 + i) * n + row, friction * slip[i]);
-        }
-        return;
-    }
-    let held = if pressed { normal } else { least };
-    let radius = friction * held;
-    let z: [S; 2] = core::array::from_fn(|i| x[i] - mass * u[i]);
-    let size = cone::length(z);
-    for i in 0..2 {
-        let sticks = size <= radius;
-        set(step, row + 1 + i, if sticks { mass * u[i] } else { x[i] - radius / size * z[i] });
-        let line = part_mut(matrix, (row + 1 + i) * n, n);
-        for (j, entry) in line.iter_mut().enumerate() {
-            // Derivative of z and of the radius with respect to impulse j.
-            let dz: [S; 2] = core::array::from_fn(|k| {
-                let unit = if j == row + 1 + k { one } else { zero };
-                unit - a(row + 1 + k, j)
-            });
-            let dr = if pressed { friction * ((if j == row { one } else { zero }) - a(row, j)) } else { zero };
-            *entry = if sticks {
-                a(row + 1 + i, j)
-            } else {
-                let along = (z[0] * dz[0] + z[1] * dz[1]) / (size * size);
-                let turned = radius / size * (dz[i] - along * z[i]);
-                (if j == row + 1 + i { one } else { zero }) - turned - dr * (z[i] / size)
-            };
-        }
-        let own = get(line, row + 1 + i) + if sticks { prox } else { zero };
-        set(line, row + 1 + i, own);
-    }
 }
 
 /// Solves `matrix x = rhs` in place by Gaussian elimination with partial pivoting; `false` where a pivot is zero.
