@@ -33,7 +33,7 @@ ROWS = 32
 # Model, and simulated time, s.
 SCENES = {"dropped": ("quadruped", 0.3), "standing": ("quadruped_hop", 1.0)}
 # Time steps, s, of both programs.
-STEPS = [1.6e-2, 1.13e-2, 8e-3, 5.7e-3, 4e-3, 2.8e-3, 2e-3, 1.4e-3, 1e-3, 5e-4]
+STEPS = [3.2e-2, 2.26e-2, 1.6e-2, 1.13e-2, 8e-3, 5.7e-3, 4e-3, 2.8e-3, 2e-3, 1.4e-3, 1e-3, 5e-4]
 TOLERANCES = [1e-4]
 REFERENCE = 1e-12
 # Errors, m, at which both programs are compared.
