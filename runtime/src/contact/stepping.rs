@@ -36,7 +36,7 @@ use core::marker::PhantomData;
 /// Relative residual of impulses that is enough where that of the rules is not reached: steps err by more.
 const RESIDUAL: f64 = 1e-5;
 /// Rounds of sweeps and Newton steps in which the residual of the rules is to be reached.
-const ROUNDS: u32 = 6;
+const ROUNDS: u32 = 4;
 /// Overlap in the middle of a step that stays, m (rad for stops of rotations), and as a part of what the fastest gap changes by
 /// in the step: what moves fast errs by more.
 const OVERLAP: [f64; 2] = [1e-6, 0.01];

@@ -157,10 +157,11 @@ fn impulses_never_add_energy() {
 fn a_hopper_lands_at_the_same_place() {
     let (hopper, start) = shipped(include_str!("../../../models/contacts/hopper.toml"));
     let errors = [1_000, 2_000, 4_000, 8_000].map(|n| error(&hopper, &start, &[0.0, 0.0], 1.0, n));
+    // In the mean, the impulse of a landing comes in time: without that, it would be off by a step, which speeds of metres a
+    // second multiply.
     for (off, n) in errors.iter().zip([1e3, 2e3, 4e3, 8e3]) {
-        assert!(*off < 10.0 / n, "{errors:?}");
+        assert!(*off < 0.3 / n, "{errors:?}");
     }
-    assert!(errors[3] < 0.5 * errors[0], "{errors:?}");
 }
 
 /// By events, its trunk is at 0.10155 m after 3 s: it kneels on the stops of its knees.

@@ -48,17 +48,22 @@ pub(super) fn mass<S: Real>(problem: &Problem<S>, touch: &Touch<S>) -> S {
     }
 }
 
-/// The contact with the largest residual, and that residual relative to the largest impulse; `velocity` has that of a row.
-pub(super) fn residual<S: Real>(terms: &Terms<S>, impulses: &[S], velocity: impl Fn(usize) -> S) -> (usize, S) {
+/// The contact with the largest residual, and that residual relative to the largest impulse; `velocity(touch, row)` is that of
+/// a row.
+pub(super) fn residual<S: Real>(
+    terms: &Terms<S>,
+    impulses: &[S],
+    velocity: impl Fn(&Touch<S>, usize) -> S,
+) -> (usize, S) {
     let Terms { problem, least, .. } = *terms;
     let zero = S::zero();
     let (mut worst, mut size) = ((0, zero), zero);
-    for (index, touch) in terms.touches().enumerate() {
+    for (index, touch) in problem.touches.iter().enumerate() {
         let c = touch.contact;
-        let (row, mass) = (c.row, mass(problem, &touch));
+        let (row, mass) = (c.row, mass(problem, touch));
         let at = |k: usize| {
             if k < c.rows() {
-                (get(impulses, row + k), velocity(row + k))
+                (get(impulses, row + k), velocity(touch, row + k))
             } else {
                 (zero, zero)
             }

@@ -2,7 +2,8 @@
 
 use super::local::Block;
 use super::{
-    energy, finite, fits, routh, solve_above, solve_near, swept, velocity, Certificate, ContactError, Effort, Problem,
+    energy, finite, fits, routh, solve_above, solve_soon, swept, velocity, Certificate, ContactError, Effort, Problem,
+    Terms,
 };
 use crate::contact::RestitutionLaw;
 use crate::lists::{copy, get, part_mut, set, split};
@@ -71,7 +72,7 @@ pub fn impact<S: Real>(
     if options.order == ImpactOrder::Sequential {
         result.rounds = sequential(problem, options.effort, impulses)?;
     } else if let (true, [touch]) = (expands(problem), problem.touches) {
-        let block = Block::of(problem, touch, impulses);
+        let block = Block::of(&alone(problem), touch, impulses);
         let found = routh::collide(&block, &touch.contact)?;
         copy(impulses, &found);
     } else {
@@ -93,11 +94,10 @@ pub(in crate::contact) fn impact_near<S: Real>(
     impulses: &mut [S],
     work: &mut [S],
 ) -> Result<Impact<S>, ContactError> {
-    let known = problem.touches.len() > 1 && impulses.iter().any(|p| *p != S::zero());
-    if !known || bounces(problem) || options.order == ImpactOrder::Sequential {
+    if problem.touches.len() < 2 || bounces(problem) || options.order == ImpactOrder::Sequential {
         return impact(problem, options, impulses, work);
     }
-    let certificate = solve_near(problem, options.effort, impulses, work)?;
+    let certificate = solve_soon(problem, options.effort, impulses, work)?;
     judged(problem, impulses, Impact { certificate, ..Impact::none() })
 }
 
@@ -178,6 +178,11 @@ fn simultaneous<S: Real, E>(
     Ok(())
 }
 
+/// A problem without limits.
+fn alone<'a, S: Real>(problem: &'a Problem<'a, S>) -> Terms<'a, S> {
+    Terms { problem, least: &[], alpha: S::zero(), anchor: &[] }
+}
+
 /// Compression and expansion of several contacts at once.
 fn expand<S: Real, E>(
     problem: &Problem<S>,
@@ -249,7 +254,7 @@ fn sequential<S: Real>(problem: &Problem<S>, effort: Effort, impulses: &mut [S])
         }
         let Some(touch) = next.1 else { return Ok(collisions) };
         let (row, rows) = (touch.contact.row, touch.contact.rows());
-        let mut block = Block::of(problem, touch, impulses);
+        let mut block = Block::of(&alone(problem), touch, impulses);
         let own: [S; 3] = core::array::from_fn(|k| if k < rows { get(impulses, row + k) } else { zero });
         block.q = block.velocity(own);
         let found = routh::collide(&block, &touch.contact)?;

@@ -1,6 +1,6 @@
 //! One contact by itself, exactly.
 
-use super::{cone, velocity, Problem, Touch};
+use super::{cone, Terms, Touch};
 use crate::lists::get;
 use crate::system::Real;
 
@@ -27,17 +27,20 @@ pub(super) struct Block<S> {
 
 impl<S: Real> Block<S> {
     /// The block of a contact, all other impulses being given.
-    pub fn of(problem: &Problem<S>, touch: &Touch<S>, impulses: &[S]) -> Self {
-        let (row, rows) = (touch.contact.row, touch.contact.rows());
+    pub fn of(terms: &Terms<S>, touch: &Touch<S>, impulses: &[S]) -> Self {
+        let (problem, row, rows) = (terms.problem, touch.contact.row, touch.contact.rows());
         let (n, zero) = (problem.b.len(), S::zero());
         let mut block = Block { w: [[zero; 3]; 3], q: [zero; 3] };
         for (i, (w, q)) in block.w.iter_mut().zip(&mut block.q).enumerate().take(rows) {
             let mut own = zero;
             for (j, w) in w.iter_mut().enumerate().take(rows) {
                 *w = get(problem.a, (row + i) * n + row + j);
+                if i == j && terms.alpha > zero {
+                    *w = *w + terms.proximal(touch);
+                }
                 own = own + *w * get(impulses, row + j);
             }
-            *q = velocity(problem, row + i, impulses) - own;
+            *q = terms.velocity(touch, row + i, impulses) - own;
         }
         block
     }

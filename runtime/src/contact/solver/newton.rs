@@ -17,9 +17,9 @@ pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], work: &mut [S]
     let (acts, rest) = split(rest, n);
     let (step, matrix) = split(rest, n);
     let mut count = 0;
-    for touch in terms.touches() {
+    for touch in terms.problem.touches {
         let c = touch.contact;
-        let acting = touch.slip.is_some() || get(terms.least, c.row) > S::zero() || pressed(terms, &touch, impulses, v);
+        let acting = touch.slip.is_some() || get(terms.least, c.row) > S::zero() || pressed(terms, touch, impulses, v);
         set(acts, c.row, if acting { S::one() } else { S::zero() });
         if acting {
             count += c.rows();
@@ -39,20 +39,20 @@ pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], work: &mut [S]
         }
     }
     let (matrix, step) = (first_mut(matrix, count * count), first_mut(step, count));
-    let acting = |touch: &Touch<S>| get(acts, touch.contact.row) > S::zero();
+    let acting = |touch: &&Touch<S>| get(acts, touch.contact.row) > S::zero();
     let mut at = 0;
-    for touch in terms.touches().filter(acting) {
+    for touch in terms.problem.touches.iter().filter(acting) {
         let rows = touch.contact.rows();
         let (lines, rhs) = (part_mut(matrix, at * count, rows * count), part_mut(step, at, rows));
-        let all = terms.touches().filter(acting);
-        equations(terms, (&touch, at), all, (impulses, v), lines, rhs);
+        let all = terms.problem.touches.iter().filter(acting);
+        equations(terms, (touch, at), all, (impulses, v), lines, rhs);
         at += rows;
     }
     if !eliminate(matrix, step) {
         return false;
     }
     let mut steps = step.iter();
-    for touch in terms.touches().filter(acting) {
+    for touch in terms.problem.touches.iter().filter(acting) {
         let own = part_mut(impulses, touch.contact.row, touch.contact.rows());
         for (p, step) in own.iter_mut().zip(&mut steps) {
             *p = *p - *step;
@@ -70,19 +70,21 @@ fn pressed<S: Real>(terms: &Terms<S>, touch: &Touch<S>, impulses: &[S], v: &[S])
 
 /// The equations of a contact, `F(P) = 0`, in `rhs`, and their derivatives by the impulses of the contacts that act, in `lines`;
 /// its own begin `at` a place.
-fn equations<S: Real>(
+fn equations<'a, S: Real>(
     terms: &Terms<S>,
     (touch, at): (&Touch<S>, usize),
-    all: impl Iterator<Item = Touch<S>>,
+    all: impl Iterator<Item = &'a Touch<S>>,
     (impulses, v): (&[S], &[S]),
     lines: &mut [S],
     rhs: &mut [S],
-) {
+) where
+    S: 'a,
+{
     let (zero, one) = (S::zero(), S::one());
     let problem = terms.problem;
     let (n, c) = (problem.b.len(), touch.contact);
     let count = (lines.len() / c.rows()).max(1);
-    let (row, mass) = (c.row, cone::mass(problem, touch));
+    let (row, mass, more) = (c.row, cone::mass(problem, touch), terms.proximal(touch));
     let (least, friction) = (get(terms.least, row), c.friction);
     let prox = S::constant(PROXIMAL);
     let p: [S; 3] = core::array::from_fn(|i| if i < c.rows() { get(impulses, row + i) } else { zero });
@@ -142,8 +144,9 @@ fn equations<S: Real>(
     for (i, line) in lines.chunks_exact_mut(count).enumerate() {
         set(rhs, i, get(&residual, i));
         for (k, entry) in part_mut(line, at, c.rows()).iter_mut().enumerate() {
+            // The proximal term is on the diagonal of `A`.
             let of_own = own.get(i).map_or(zero, |own| get(own, k));
-            *entry = *entry + of_own;
+            *entry = *entry + of_own + from.get(i).map_or(zero, |from| get(from, k)) * more;
         }
     }
 }
@@ -152,7 +155,7 @@ fn equations<S: Real>(
 /// to the diagonal leaves. `false` where the equations are singular.
 pub(super) fn differentiate<S: Real>(terms: &Terms<S>, impulses: &mut [S], work: &mut [S]) -> bool {
     (0..2).all(|_| {
-        velocities(terms.problem, impulses, first_mut(work, impulses.len()));
+        velocities(terms, impulses, first_mut(work, impulses.len()));
         step(terms, impulses, work)
     })
 }

@@ -423,11 +423,11 @@ fn derivatives_of_impulses_are_those_of_differences() {
     assert!(compared > 550 && kinks < 10, "{compared} {kinks}");
 }
 
-/// Warm starts: the forces of a problem nearby need few of Newton's steps, and forces that are far from any solution do no harm.
+/// Warm starts: the forces of a problem nearby need no sweep, and forces that are far from any solution do no harm.
 #[test]
-fn a_problem_nearby_needs_fewer_steps() {
+fn a_problem_nearby_needs_fewer_sweeps() {
     let mut r = Random(5);
-    let (mut cold_steps, mut warm) = (0, 0);
+    let (mut swept, mut warm) = (0, 0);
     for _ in 0..200 {
         let (mut case, _) = random(&mut r, 3, 3, 3.0, 0.8, 0.0);
         let rows = case.b.len();
@@ -452,10 +452,10 @@ fn a_problem_nearby_needs_fewer_steps() {
                 assert!((x - y).abs() < 1e-8 * size, "{x} {y}");
             }
         }
-        cold_steps += a.newton;
-        warm += b.newton;
+        swept += a.sweeps;
+        warm += b.sweeps;
     }
-    assert!(2 * warm < cold_steps, "{warm} steps against {cold_steps}");
+    assert!(10 * warm < swept, "{warm} sweeps against {swept}");
 }
 
 /// The four lower corners of a box that lies on them, each with a velocity; mass 2 kg, half sizes 0.2 m, 0.15 m, 0.1 m.
