@@ -301,6 +301,15 @@ pub fn level() -> Level {
     processor::level()
 }
 
+/// From now on the program uses no better instructions than those of a level, which is returned: the lower one of `most`
+/// and of what it used before. Generated functions with fast arithmetic then have the bits that they have on processors
+/// of that level; those of exact arithmetic do not depend on it. Machine code that was made before stays as it is, and so do
+/// functions for which the compiler was told the processor (`-C target-cpu`). Where the level is known at compile time,
+/// nothing changes.
+pub fn limit_level(most: Level) -> Level {
+    processor::limit_level(most)
+}
+
 /// Runs a kernel for one state.
 #[inline(always)]
 pub fn call<K: Kernel<ID, 1, X>, const ID: usize, X>(arguments: X) {
@@ -351,6 +360,12 @@ mod processor {
         };
         LEVEL.store(found as u8 + 1, Ordering::Relaxed);
         found
+    }
+
+    pub fn limit_level(most: Level) -> Level {
+        let now = level().min(most);
+        LEVEL.store(now as u8 + 1, Ordering::Relaxed);
+        now
     }
 
     #[inline(always)]
@@ -408,6 +423,10 @@ mod processor {
             true => Level::Fused,
             false => Level::Plain,
         }
+    }
+
+    pub fn limit_level(_: Level) -> Level {
+        level()
     }
 
     #[inline(always)]

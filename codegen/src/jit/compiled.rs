@@ -53,6 +53,8 @@ pub struct Compiled<S: Number = f64> {
     pub(super) interpreted: bool,
     /// Number of calls of an output that the interpreter computes before the output is compiled.
     patience: u32,
+    /// Whether one of these two has to be asked.
+    pub(super) asks: bool,
     /// Calls of each of [`Output::ALL`], counted up to that number.
     calls: Vec<u32>,
     params: Vec<S>,
@@ -74,7 +76,7 @@ pub(super) struct Shared<S> {
     options: Options,
     sizes: Sizes,
     /// One for each of [`Output::ALL`].
-    outputs: Vec<OnceLock<Result<MachineCode<S>, CompileError>>>,
+    outputs: [OnceLock<Result<MachineCode<S>, CompileError>>; Output::ALL.len()],
     coordinate_rates: OnceLock<Result<MachineCode<S>, CompileError>>,
     /// The same with only some rows of the constraints, by the rows that act.
     reduced: Mutex<BTreeMap<Vec<bool>, Arc<Shared<S>>>>,
@@ -87,7 +89,7 @@ pub(super) struct Shared<S> {
 impl<S: Number> Shared<S> {
     /// Nothing is compiled yet.
     fn new(plan: Plan, options: Options, sizes: Sizes) -> Self {
-        let outputs = Output::ALL.iter().map(|_| OnceLock::new()).collect();
+        let outputs = std::array::from_fn(|_| OnceLock::new());
         let (coordinate_rates, reduced, lanes) = (OnceLock::new(), Mutex::default(), AllLanes::default());
         Shared { plan, options, sizes, outputs, coordinate_rates, reduced, implicit: OnceLock::new(), lanes }
     }
@@ -136,6 +138,12 @@ impl<S: Number> Shared<S> {
         self.outputs[output as usize].get_or_init(make).as_ref()
     }
 
+    /// The same, if it is made.
+    #[inline(always)]
+    pub(super) fn made(&self, output: Output) -> Option<&MachineCode<S>> {
+        self.outputs[output as usize].get()?.as_ref().ok()
+    }
+
     pub(super) fn coordinate_rates(&self) -> Result<&MachineCode<S>, &CompileError> {
         self.coordinate_rates.get_or_init(|| self.compiled_coordinate_rates(1)).as_ref()
     }
@@ -174,6 +182,7 @@ impl<S: Number> Compiled<S> {
             interpreter,
             interpreted: false,
             patience: 0,
+            asks: false,
             calls: Vec::new(),
             params,
             acts,
@@ -188,7 +197,7 @@ impl<S: Number> Compiled<S> {
     /// gives the same bits. [`Compiled::evaluate`] still runs machine code, [`Compiled::evaluate_or_interpret`] does not.
     #[must_use]
     pub fn interpreted(self) -> Self {
-        Compiled { interpreted: true, ..self }
+        Compiled { interpreted: true, asks: true, ..self }
     }
 
     /// Number of calls for which the interpreter takes about as long as making the code takes.
@@ -198,7 +207,8 @@ impl<S: Number> Compiled<S> {
     /// code that is hardly used is not worth the time of making it. In exact arithmetic both give the same bits.
     #[must_use]
     pub fn compiled_after(self, calls: u32) -> Self {
-        Compiled { patience: calls, calls: vec![0; Output::ALL.len()], ..self }
+        let asks = self.interpreted || calls > 0;
+        Compiled { patience: calls, asks, calls: vec![0; Output::ALL.len()], ..self }
     }
 
     /// The plan of which the code is made.
@@ -286,7 +296,27 @@ impl<S: Number> Compiled<S> {
     /// Computes an output that one of the traits asks for, whose arrays are right. Returns whether there is code for
     /// it.
     #[inline(always)]
-    pub(super) fn run(&mut self, output: Output, arguments: [&[S]; 3], results: &mut [&mut [S]]) -> bool {
+    pub(super) fn run<const N: usize>(
+        &mut self,
+        output: Output,
+        arguments: [&[S]; 3],
+        mut results: [&mut [S]; N],
+    ) -> bool {
+        let done = self.shared.made(output).filter(|_| !self.asks).is_some_and(|code| {
+            let results = results.each_mut().map(|result| &mut **result);
+            code.call_lean(arguments, &self.interpreter.tau, results, &mut self.scratch)
+        });
+        done || self.run_any(output, arguments, results)
+    }
+
+    /// [`Compiled::run`] in every case.
+    #[inline(never)]
+    pub(super) fn run_any<const N: usize>(
+        &mut self,
+        output: Output,
+        arguments: [&[S]; 3],
+        mut results: [&mut [S]; N],
+    ) -> bool {
         if self.interprets(output) {
             return false;
         }
@@ -294,13 +324,12 @@ impl<S: Number> Compiled<S> {
         let scratch = long_enough(&mut self.scratch, code);
         let given = Given::new(code, arguments, (&self.interpreter, &self.params, &self.acts));
         // Code for one state never gives up.
-        code.call(&given, results, scratch);
+        code.call(&given, &mut results, scratch);
         true
     }
 
     /// Whether the interpreter computes an output now; the call is counted. Code that another clone has had made is taken at
     /// once, if it gives the same bits.
-    #[inline]
     pub(super) fn interprets(&mut self, output: Output) -> bool {
         if self.interpreted {
             return true;
@@ -406,7 +435,7 @@ impl<S: Number> Reducible for Compiled<S> {
     }
 
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
-        if !self.run(Output::Gaps, [q, v, &[]], &mut [gaps, velocities, entries]) {
+        if !self.run(Output::Gaps, [q, v, &[]], [gaps, velocities, entries]) {
             self.interpreter.gaps(q, v, gaps, velocities, entries);
         }
     }
@@ -424,7 +453,7 @@ impl<S: Number> Reducible for Compiled<S> {
         velocities: &mut Vec<S>,
         entries: &mut Vec<S>,
     ) {
-        if !self.run(Output::Gaps, [q, v, &[]], &mut [gaps, velocities, entries]) {
+        if !self.run(Output::Gaps, [q, v, &[]], [gaps, velocities, entries]) {
             self.interpreter.gaps_of(wanted, (q, v), gaps, velocities, entries);
         }
     }
@@ -456,7 +485,6 @@ impl Model {
 }
 
 /// Working memory that is long enough for a function.
-#[inline]
 fn long_enough<'a, S: Number>(scratch: &'a mut Vec<S>, code: &MachineCode<S>) -> &'a mut [S] {
     if scratch.len() < code.scratch() {
         scratch.resize(code.scratch(), S::zero());

@@ -10,7 +10,7 @@ impl<S: Number> Compiled<S> {
     /// # Panics
     /// As [`Compiled::velocities`].
     pub fn rates(&mut self, q: &[S], p: &[S], v: &mut [S], qd: &mut [S], pd: &mut [S]) {
-        if self.run(Output::Rates, [q, p, &[]], &mut [qd, pd]) {
+        if self.run(Output::Rates, [q, p, &[]], [qd, pd]) {
             self.velocities(q, p, v);
         } else {
             self.interpreter.rates(q, p, v, qd, pd);
@@ -22,7 +22,7 @@ impl<S: Number> Compiled<S> {
     /// # Panics
     /// If a slice has another length than the mechanism has coordinates or velocities.
     pub fn velocities(&mut self, q: &[S], p: &[S], v: &mut [S]) {
-        if !self.run(Output::Velocities, [q, p, &[]], &mut [v]) {
+        if !self.run(Output::Velocities, [q, p, &[]], [v]) {
             self.interpreter.velocities(q, p, v);
         }
     }
@@ -32,7 +32,7 @@ impl<S: Number> Compiled<S> {
     /// # Panics
     /// As [`Compiled::velocities`].
     pub fn bias(&mut self, q: &[S], v: &[S], h: &mut [S]) {
-        if !self.run(Output::Bias, [q, v, &[]], &mut [h]) {
+        if !self.run(Output::Bias, [q, v, &[]], [h]) {
             self.interpreter.bias(q, v, h);
         }
     }
@@ -43,7 +43,7 @@ impl<S: Number> Compiled<S> {
     /// As [`Compiled::velocities`].
     pub fn energy(&mut self, q: &[S], p: &[S]) -> (S, S) {
         let mut energy = [S::zero(); 2];
-        match self.run(Output::Energy, [q, p, &[]], &mut [&mut energy]) {
+        match self.run(Output::Energy, [q, p, &[]], [&mut energy]) {
             true => (energy[0], energy[1]),
             false => self.interpreter.energy(q, p),
         }
@@ -54,7 +54,7 @@ impl<S: Number> Compiled<S> {
     /// # Panics
     /// As [`Compiled::velocities`].
     pub fn momenta(&mut self, q: &[S], v: &[S], p: &mut [S]) {
-        if !self.run(Output::Momenta, [q, v, &[]], &mut [p]) {
+        if !self.run(Output::Momenta, [q, v, &[]], [p]) {
             self.interpreter.momenta(q, v, p);
         }
     }
@@ -64,7 +64,7 @@ impl<S: Number> Compiled<S> {
     /// # Panics
     /// As [`Compiled::velocities`].
     pub fn accelerations(&mut self, q: &[S], v: &[S], a: &mut [S]) {
-        if !self.run(Output::Accelerations, [q, v, &[]], &mut [a]) {
+        if !self.run(Output::Accelerations, [q, v, &[]], [a]) {
             self.interpreter.accelerations(q, v, a);
         }
     }
@@ -74,7 +74,7 @@ impl<S: Number> Compiled<S> {
     /// # Panics
     /// As [`Compiled::velocities`].
     pub fn inverse_dynamics(&mut self, q: &[S], v: &[S], a: &[S], tau: &mut [S]) {
-        if !self.run(Output::InverseDynamics, [q, v, a], &mut [tau]) {
+        if !self.run(Output::InverseDynamics, [q, v, a], [tau]) {
             self.interpreter.inverse_dynamics(q, v, a, tau);
         }
     }
@@ -84,7 +84,7 @@ impl<S: Number> Compiled<S> {
     /// # Panics
     /// As [`Compiled::velocities`].
     pub fn mass_matrix(&mut self, q: &[S], m: &mut [S]) {
-        if !self.run(Output::MassMatrix, [q, &[], &[]], &mut [m]) {
+        if !self.run(Output::MassMatrix, [q, &[], &[]], [m]) {
             self.interpreter.mass_matrix(q, m);
         }
     }

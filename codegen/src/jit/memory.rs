@@ -1,9 +1,9 @@
 //! Machine code in memory, and its calls.
 //!
 //! The only `unsafe` code of the generator is in this file. It is sound for these reasons:
-//! - A function is called only through [`MachineCode::call`], which compares the length of every slice with that of the
-//!   array of which the code was made, times the number of states that it computes at once. The code reads and writes at
-//!   constant places inside these arrays, in tables that the function owns, and in working memory whose length is
+//! - A function is called only through [`MachineCode::call`] and [`MachineCode::call_lean`], which compare the length of every
+//!   slice with that of the array of which the code was made, times the number of states that it computes at once. The code
+//!   reads and writes at constant places inside these arrays, in tables that the function owns, and in working memory whose length is
 //!   compared too. Tables and working memory begin at multiples of 64 bytes, as aligned loads and stores of vectors want.
 //! - Tables of height fields are read too, at places that the code bounds by their lengths. They stay where they are until the
 //!   program ends.
@@ -132,10 +132,10 @@ pub struct MachineCode<S> {
     scratch: usize,
     /// Length of the code, bytes.
     size: usize,
-    /// Constants and tables that the code reads.
-    constants: Box<[S]>,
-    /// The first entry that is at an address that vectors may have.
-    first_constant: usize,
+    /// Owns the constants and tables that the code reads.
+    _constants: Box<[S]>,
+    /// The first of them, at an address that vectors may have.
+    numbers: *const S,
 }
 
 /// The input arrays of a call.
@@ -174,7 +174,13 @@ fn before_aligned<S>(at: *const S) -> usize {
     (at as usize).wrapping_neg() % LINE / size_of::<S>()
 }
 
-// SAFETY: the module is not touched before it is dropped, and the code has no state of its own.
+/// The first address of the working memory that vectors may have; its length includes what is skipped.
+#[inline(always)]
+fn aligned<S>(scratch: &mut [S]) -> *mut S {
+    scratch.as_mut_ptr().wrapping_add(before_aligned(scratch.as_ptr()))
+}
+
+// SAFETY: the module is not touched before it is dropped, the code has no state of its own, and its constants do not change.
 unsafe impl<S> Send for MachineCode<S> {}
 // SAFETY: the same.
 unsafe impl<S> Sync for MachineCode<S> {}
@@ -277,8 +283,8 @@ impl<S: Number> MachineCode<S> {
             results,
             scratch: lanes * body.scratch + padding::<S>(),
             size: body.size,
-            constants,
-            first_constant: first,
+            numbers: constants[first..].as_ptr(),
+            _constants: constants,
         })
     }
 
@@ -306,10 +312,9 @@ impl<S: Number> MachineCode<S> {
     #[inline(always)]
     pub fn call(&self, inputs: &impl Inputs<S>, results: &mut [&mut [S]], scratch: &mut [S]) -> bool {
         assert!(scratch.len() >= self.scratch, "the working memory is too short");
-        // Few programs read other fields than joint forces, and a call of a small one takes as long as its code. Nothing is
-        // read from the places that are not written.
+        // Nothing is read from the places that are not written.
         let mut read = [const { MaybeUninit::uninit() }; INPUTS + 1];
-        read[INPUTS].write(self.constants[self.first_constant..].as_ptr());
+        read[INPUTS].write(self.numbers);
         let mut set = |first: usize, arrays: &[&[S]]| {
             for (k, array) in arrays.iter().enumerate() {
                 let expected = self.inputs[first + k];
@@ -328,11 +333,44 @@ impl<S: Number> MachineCode<S> {
             assert!(result.len() == *len, "a result has {} entries, expected {len}", result.len());
             to.write(result.as_mut_ptr());
         }
-        // The length of the working memory includes what is skipped.
-        let skipped = before_aligned(scratch.as_ptr());
-        let scratch = &mut scratch[skipped..];
         // SAFETY: see the head of this file.
-        unsafe { (self.entry)(read.as_ptr().cast(), written.as_ptr().cast(), scratch.as_mut_ptr()) == 0 }
+        unsafe { (self.entry)(read.as_ptr().cast(), written.as_ptr().cast(), aligned(scratch)) == 0 }
+    }
+
+    /// Runs code for one state that reads no other field than joint forces. Returns whether it did: not if it reads others, or
+    /// a slice or the working memory has another length; [`call`](Self::call) tells which. A call of a small function takes as
+    /// long as its code, so that there is one way out, and nothing is in memory before it but what the code reads.
+    #[inline(always)]
+    pub fn call_lean<const N: usize>(
+        &self,
+        arguments: [&[S]; ARGUMENTS],
+        tau: &[S],
+        results: [&mut [S]; N],
+        scratch: &mut [S],
+    ) -> bool {
+        let [a, b, c] = arguments;
+        let inputs = [a, b, c, tau];
+        let (count, lengths) = &self.results;
+        let mut wrong = usize::from(self.more) | (N ^ count);
+        for (array, len) in inputs.iter().zip(&self.inputs) {
+            wrong |= array.len() ^ len;
+        }
+        for (result, len) in results.iter().zip(lengths) {
+            wrong |= result.len() ^ len;
+        }
+        if wrong != 0 || scratch.len() < self.scratch {
+            return false;
+        }
+        let mut read = [const { MaybeUninit::uninit() }; INPUTS + 1];
+        for (to, array) in read.iter_mut().zip(inputs) {
+            to.write(array.as_ptr());
+        }
+        read[INPUTS].write(self.numbers);
+        let written = results.map(<[S]>::as_mut_ptr);
+        let scratch = aligned(scratch);
+        // SAFETY: see the head of this file. Code for one state never gives up.
+        unsafe { (self.entry)(read.as_ptr().cast(), written.as_ptr(), scratch) };
+        true
     }
 }
 

@@ -8,6 +8,17 @@ use super::memory::Number;
 use super::Compiled;
 use crate::output::Output;
 
+impl<S: Number> Compiled<S> {
+    /// The rates in every case.
+    #[inline(never)]
+    fn any_rates(&mut self, t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
+        self.drive_to(t);
+        if !self.run_any(Output::Rates, [q, p, &[]], [qd, pd]) {
+            self.interpreter.rates_at(t, q, p, qd, pd);
+        }
+    }
+}
+
 impl<S: Number> System for Compiled<S> {
     type Scalar = S;
     type Coordinates = Vec<S>;
@@ -27,9 +38,13 @@ impl<S: Number> System for Compiled<S> {
 
     #[inline]
     fn rates_at(&mut self, t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
-        self.drive_to(t);
-        if !self.run(Output::Rates, [q, p, &[]], &mut [qd, pd]) {
-            self.interpreter.rates_at(t, q, p, qd, pd);
+        let code = self.shared.made(Output::Rates).filter(|_| !self.asks && self.drives.is_none());
+        let done = code.is_some_and(|code| {
+            // The vectors are looked into last, which leaves more registers.
+            code.call_lean([q, p, &[]], &self.interpreter.tau, [qd, pd], &mut self.scratch)
+        });
+        if !done {
+            self.any_rates(t, q, p, qd, pd);
         }
     }
 
@@ -81,7 +96,7 @@ impl<S: Number> Differentiable for Compiled<S> {
         let (rest, dpd_dp) = copies[..4 * nv * nv].split_at_mut(3 * nv * nv);
         let (rest, dpd_dq) = rest.split_at_mut(2 * nv * nv);
         let (dv_dq, dv_dp) = rest.split_at_mut(nv * nv);
-        let results = &mut [&mut out.v[..], &mut out.pd[..], dv_dq, dv_dp, dpd_dq, dpd_dp];
+        let results = [&mut out.v[..], &mut out.pd[..], dv_dq, dv_dp, dpd_dq, dpd_dp];
         let compiled = self.run(Output::Derivatives, [q, p, &[]], results);
         if compiled {
             let blocks = copies.chunks_exact((nv * nv).max(1));
@@ -119,7 +134,7 @@ impl<S: Number> Constrained for Compiled<S> {
     }
 
     fn constraint_residuals(&mut self, q: &Vec<S>, residual: &mut Vec<S>, jacobian: &mut Vec<S>) {
-        if !self.run(Output::ConstraintResiduals, [q, &[], &[]], &mut [residual, jacobian]) {
+        if !self.run(Output::ConstraintResiduals, [q, &[], &[]], [residual, jacobian]) {
             self.interpreter.constraint_residuals(q, residual, jacobian);
         }
     }
@@ -130,7 +145,7 @@ impl<S: Number> Constrained for Compiled<S> {
         augmented.resize(p.len().max(augmented.len()), S::zero());
         augmented[..p.len()].copy_from_slice(p);
         let arguments = [&q[..], &augmented[..p.len()], &[]];
-        let compiled = self.run(Output::ProjectMomenta, arguments, &mut [v, p, sigma]);
+        let compiled = self.run(Output::ProjectMomenta, arguments, [v, p, sigma]);
         self.copies = augmented;
         if !compiled {
             self.interpreter.project_momenta(t, q, p, v, sigma);
@@ -138,14 +153,14 @@ impl<S: Number> Constrained for Compiled<S> {
     }
 
     fn position_correction(&mut self, q: &Vec<S>, residual: &mut Vec<S>, dq: &mut Vec<S>, pivots: &mut Vec<S>) {
-        if !self.run(Output::PositionCorrection, [q, &[], &[]], &mut [residual, dq, pivots]) {
+        if !self.run(Output::PositionCorrection, [q, &[], &[]], [residual, dq, pivots]) {
             self.interpreter.position_correction(q, residual, dq, pivots);
         }
     }
 
     fn multipliers(&mut self, t: S, q: &Vec<S>, v: &Vec<S>, lambda: &mut Vec<S>) {
         self.drive_to(t);
-        if !self.run(Output::Multipliers, [q, v, &[]], &mut [lambda]) {
+        if !self.run(Output::Multipliers, [q, v, &[]], [lambda]) {
             self.interpreter.multipliers(t, q, v, lambda);
         }
     }

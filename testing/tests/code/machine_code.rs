@@ -4,12 +4,14 @@
 //! loops, both precisions.
 
 use std::collections::BTreeSet;
+use std::process::Command;
 
 use mbd_codegen::jit::{best_lanes, CompileError, Compiled, Number};
 use mbd_codegen::model::Model;
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::{search, Arithmetic, Options, Output, Precision, RolledCode};
+use mbd_runtime::kernel::{self, Level};
 use mbd_runtime::{
     Accelerated, Conjugate, Constrained, Differentiable, Energetic, Interpreter, Packed, Scalar, System,
 };
@@ -118,6 +120,39 @@ fn loops() {
 fn rolled_code() {
     let rolled = compare_all(chain, 12);
     assert!(rolled > 60, "{rolled} outputs are rolled");
+}
+
+/// The environment variable that tells [`at_a_lower_level`] the level.
+const LEVEL: &str = "MBD_TEST_LEVEL";
+
+/// Processors with fewer instructions than this one: other machine code, with fewer registers or by Cranelift. The level holds
+/// for a whole program, so that each has one of its own.
+#[test]
+fn lower_levels() {
+    for level in [Level::Fused, Level::Plain].into_iter().filter(|level| *level < kernel::level()) {
+        let program = std::env::current_exe().expect("this program has a path");
+        let run = Command::new(program)
+            .args(["--exact", "machine_code::at_a_lower_level", "--ignored", "--nocapture"])
+            .env(LEVEL, format!("{level:?}"))
+            .output()
+            .expect("this program starts");
+        let [out, err] = [&run.stdout, &run.stderr].map(|text| String::from_utf8_lossy(text));
+        assert!(run.status.success() && out.contains("1 passed"), "{level:?}:\n{out}{err}");
+    }
+}
+
+#[test]
+#[ignore = "`lower_levels` runs it, with the level in the environment"]
+fn at_a_lower_level() {
+    let Ok(wanted) = std::env::var(LEVEL) else { return };
+    let most = if wanted == "Plain" { Level::Plain } else { Level::Fused };
+    assert_eq!(kernel::limit_level(most), most);
+    compare_all(tree, 10);
+    compare_all(closed, 5);
+    compare_all(chain, 4);
+    (1150..1170).for_each(|seed| {
+        fuzzed::compare(seed);
+    });
 }
 
 /// The functions of the traits by machine code in exact arithmetic and by the interpreter.

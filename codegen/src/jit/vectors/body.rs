@@ -145,6 +145,10 @@ pub struct Body {
     now: Lanes,
     /// Where vectors are whose parts have been asked for.
     stored: BTreeMap<Id, usize>,
+    /// Constants by their bits, each once for every number of lanes.
+    constants: BTreeMap<(u64, Lanes), Id>,
+    /// The bits of these.
+    bits: BTreeMap<Id, u64>,
 }
 
 /// A loop that is being recorded: first place of what it carries.
@@ -156,12 +160,29 @@ pub struct Loop {
 
 impl Body {
     pub fn new(fused: bool, width: Width, branches: usize) -> Body {
-        let (items, lanes, stored) = (Vec::new(), Vec::new(), BTreeMap::new());
-        Body { items, lanes, carried: 0, fused, width, branches, now: width.states, stored }
+        Body {
+            items: Vec::new(),
+            lanes: Vec::new(),
+            carried: 0,
+            fused,
+            width,
+            branches,
+            now: width.states,
+            stored: BTreeMap::new(),
+            constants: BTreeMap::new(),
+            bits: BTreeMap::new(),
+        }
     }
 
     fn value(&mut self, step: Step) -> Id {
         let id = self.lanes.len() as Id;
+        if let Step::Constant(bits) = step {
+            let known = *self.constants.entry((bits, self.now)).or_insert(id);
+            if known != id {
+                return known;
+            }
+            self.bits.insert(id, bits);
+        }
         self.items.push(Item::Value(id, step));
         self.lanes.push(self.now);
         id

@@ -113,6 +113,8 @@ const SELECT: Code = code(Map::M0f3a, 1, 0x4b);
 const SELECT_BY_MASK: Code = code(Map::M0f38, 1, 0x65);
 /// Signs as bits of a general register (VEX).
 const SIGNS: Code = code(Map::M0f, 1, 0x50);
+/// Tells in the flag of zero whether a sign is set (VEX).
+const TEST_SIGNS: Code = code(Map::M0f38, 1, 0x0f);
 /// Signs as a mask (EVEX).
 const SIGNS_TO_MASK: Code = code(Map::M0f38, 2, 0x39);
 
@@ -141,6 +143,11 @@ pub enum Predicate {
     LessOrEqual = 0x12,
     /// Not `a <= b`, also for NaN.
     NotLessOrEqual = 0x16,
+}
+
+/// Whether a register has a name only in instructions with EVEX prefix.
+fn far(register: Register) -> bool {
+    register >= 16
 }
 
 /// Machine code that is being written.
@@ -217,7 +224,6 @@ impl Assembler {
 
     /// Whether an instruction needs the prefix of AVX-512, or is shorter with it.
     fn evex(&self, i: &Instruction) -> bool {
-        let far = |r: u8| r >= 16;
         let needed = match i.last {
             Last::Register(r) => far(r),
             Last::Memory(m) => m.broadcast && !matches!(i.code.byte, 0x12 | 0x19),
@@ -317,7 +323,7 @@ impl Assembler {
 
     /// `to = if the sign of mask is set { yes } else { no }`, lane by lane.
     pub fn select(&mut self, lanes: Lanes, to: Register, mask: Register, yes: Register, no: Register) {
-        if self.wide {
+        if lanes == Lanes::Eight || [to, mask, yes, no].into_iter().any(far) {
             self.masked(lanes, SIGNS_TO_MASK, [1, 0, mask], (0, false));
             self.masked(lanes, SELECT_BY_MASK, [to, no, yes], (1, false));
         } else {

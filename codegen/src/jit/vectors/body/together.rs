@@ -29,13 +29,9 @@ impl Body {
         self.value_of(lanes, Step::Binary(Binary::Join, a, b))
     }
 
-    /// The bits of a value that has just been made of a constant.
+    /// The bits of a constant.
     fn constant_of(&self, id: Id) -> Option<u64> {
-        let recent = self.items.iter().rev().take(8);
-        recent.into_iter().find_map(|item| match item {
-            Item::Value(other, Step::Constant(bits)) if *other == id => Some(*bits),
-            _ => None,
-        })
+        self.bits.get(&id).copied()
     }
 
     /// A number of a vector, which is stored when it is first asked for a part: its numbers are read where they are used.

@@ -1,6 +1,6 @@
 //! General registers, jumps, and calls.
 
-use super::{Address, Assembler, General, Last, Register, SIGNS, SIGNS_TO_MASK};
+use super::{far, Address, Assembler, General, Last, Register, SIGNS, SIGNS_TO_MASK, TEST_SIGNS};
 use crate::jit::vectors::Lanes;
 
 /// A place in the code to which jumps lead.
@@ -27,15 +27,20 @@ const KEPT: [General; 9] = [
 impl Assembler {
     /// Jumps if the sign of a lane is set. Changes `r10`.
     pub fn jump_if_signs(&mut self, lanes: Lanes, x: Register) -> Jump {
-        if self.wide {
+        let by_mask = lanes == Lanes::Eight || far(x);
+        if by_mask {
             self.masked(lanes, SIGNS_TO_MASK, [1, 0, x], (0, false));
             // kmovw r10d, k1
             self.bytes.extend([0xc5, 0x78, 0x93, 0xd1]);
-        } else {
+        } else if lanes == Lanes::One {
             self.vector(lanes, SIGNS, General::R10 as u8, None, Last::Register(x));
+        } else {
+            self.vector(lanes, TEST_SIGNS, x, None, Last::Register(x));
         }
-        // test r10b, all lanes
-        self.bytes.extend([0x41, 0xf6, 0xc2, ((1_u16 << lanes.count()) - 1) as u8]);
+        if by_mask || lanes == Lanes::One {
+            // test r10b, all lanes
+            self.bytes.extend([0x41, 0xf6, 0xc2, ((1_u16 << lanes.count()) - 1) as u8]);
+        }
         // jnz
         self.bytes.extend([0x0f, 0x85]);
         self.open_jump()

@@ -49,7 +49,7 @@ fn vectors_of_32_bytes() {
                 a.broadcast(FOUR, 8, Last::Memory(address));
             }),
             ("c5 cd c2 ef 12 c4 c1 55 df e8", &|a| a.zero_below(FOUR, 5, [6, 7, 8])),
-            ("c4 41 7d 50 d1 41 f6 c2 0f 0f 85 00 00 00 00", &|a| a.exit_if_signs(FOUR, 9)),
+            ("c4 42 7d 0f c9 0f 85 00 00 00 00", &|a| a.exit_if_signs(FOUR, 9)),
         ],
     );
 }
@@ -73,6 +73,8 @@ fn vectors_of_64_bytes() {
             }),
             ("62 f1 8d 40 73 f3 3f", &|a| a.shift_left(EIGHT, 30, 3, 63)),
             ("62 92 fe 48 39 c9 62 f2 e5 41 65 d4", &|a| a.select(EIGHT, 2, 25, 4, 19)),
+            // Where the registers have names in shorter instructions, these do it.
+            ("c4 e3 6d 4b cb c0", &|a| a.select(FOUR, 1, 12, 3, 2)),
             ("62 b1 cd 48 c2 c9 16 62 91 fd c9 28 ec", &|a| a.zero_below(EIGHT, 5, [6, 17, 28])),
             ("62 42 fd 48 19 41 02", &|a| {
                 let address = Address { base: General::R9, index: None, offset: 16, broadcast: true };

@@ -15,8 +15,11 @@ impl Writer<'_> {
         self.known[id as usize].uses.iter().rev().copied().find(|k| *k > self.now)
     }
 
+    /// Whether a value is used again so soon that it is read into a register. Constants are not: instructions read them at
+    /// no cost.
     pub(super) fn soon(&self, id: Id) -> bool {
-        self.next_use_after_now(id).is_some_and(|k| k <= self.now + SOON)
+        let constant = matches!(self.known[id as usize].source, Some(Step::Constant(_)));
+        !constant && self.next_use_after_now(id).is_some_and(|k| k <= self.now + SOON)
     }
 
     /// How many numbers a value has.
