@@ -174,6 +174,42 @@ impl Body {
         }
     }
 
+    /// Numbers that blocks have left in the working memory are read where they are used, if they are still there then: a block
+    /// is given more of them than there are registers. In loops they are read at the beginning of a turn.
+    pub fn read_in_place(&mut self) {
+        if self.items.iter().any(|item| matches!(item, Item::Open { .. })) {
+            return;
+        }
+        let mut last_use = vec![0; self.lanes.len()];
+        for (k, item) in self.items.iter().enumerate() {
+            let mut uses = |id: Id| last_use[id as usize] = k;
+            match item {
+                Item::Value(_, step) => step.operands().for_each(&mut uses),
+                Item::Store(_, id) | Item::ExitIfSigns(id) | Item::CallIfSigns(id, _) => uses(*id),
+                Item::Call(_) | Item::Open { .. } | Item::Close { .. } => {}
+            }
+        }
+        // When an entry is written next.
+        let mut written = BTreeMap::new();
+        for (k, item) in self.items.iter_mut().enumerate().rev() {
+            match item {
+                Item::Store(entry, id) => {
+                    let all = entry.at..entry.at + self.lanes[*id as usize].count();
+                    written.extend(all.map(|at| ((entry.array, at), k)));
+                }
+                Item::Value(id, step) => {
+                    let Step::Load(entry @ Entry { array: Array::Rows(_) | Array::Kept, .. }) = *step else { continue };
+                    let mut all = entry.at..entry.at + self.lanes[*id as usize].count();
+                    let last = last_use[*id as usize];
+                    if all.all(|at| written.get(&(entry.array, at)).is_none_or(|k| *k > last)) {
+                        *step = Step::Again(entry);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+
     fn value(&mut self, step: Step) -> Id {
         let id = self.lanes.len() as Id;
         if let Step::Constant(bits) = step {
