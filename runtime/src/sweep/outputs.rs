@@ -333,12 +333,16 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for (left_out, constraint) in w.constraints.left_out.iter_mut().zip(&self.tree.constraints) {
             *left_out = constraint.range().all(|row| wanted.get(row) == Some(&false));
         }
-        for (left_out, wanted) in w.constraints.rows_left_out.iter_mut().zip(wanted) {
-            *left_out = !wanted;
+        if cfg!(feature = "hulls") {
+            for (left_out, wanted) in w.constraints.rows_left_out.iter_mut().zip(wanted) {
+                *left_out = !wanted;
+            }
         }
         self.gaps(q, v, u, w, results);
         w.constraints.left_out.fill(false);
-        w.constraints.rows_left_out.fill(false);
+        if cfg!(feature = "hulls") {
+            w.constraints.rows_left_out.fill(false);
+        }
     }
 
     /// Articulated inertia with all freedoms and unknowns eliminated.
