@@ -149,6 +149,8 @@ pub struct Body {
     constants: BTreeMap<(u64, Lanes), Id>,
     /// The bits of these.
     bits: BTreeMap<Id, u64>,
+    /// Products of the sine and cosine that are being recorded, which have some in common.
+    products: Option<BTreeMap<(Id, Id), Id>>,
 }
 
 /// A loop that is being recorded: first place of what it carries.
@@ -171,6 +173,7 @@ impl Body {
             stored: BTreeMap::new(),
             constants: BTreeMap::new(),
             bits: BTreeMap::new(),
+            products: None,
         }
     }
 
@@ -264,7 +267,16 @@ impl Body {
     }
 
     fn product(&mut self, operation: Binary, a: Signed, b: Signed) -> Signed {
-        Signed { id: self.binary(operation, a.id, b.id), minus: a.minus != b.minus }
+        let (factors, minus) = ((a.id.min(b.id), a.id.max(b.id)), a.minus != b.minus);
+        let known = self.products.as_ref().filter(|_| operation == Binary::Mul);
+        if let Some(id) = known.and_then(|products| products.get(&factors)) {
+            return Signed { id: *id, minus };
+        }
+        let id = self.binary(operation, a.id, b.id);
+        if let (Some(products), Binary::Mul) = (&mut self.products, operation) {
+            products.insert(factors, id);
+        }
+        Signed { id, minus }
     }
 
     /// A value whose signs are set where angles are beyond the range of the main path.
@@ -290,7 +302,10 @@ impl Body {
 
     fn pair(&mut self, angle: Signed) -> [Signed; 2] {
         let fused = self.fused;
-        main_path(self, angle, Precision::F64, fused, Body::turned)
+        self.products = Some(BTreeMap::new());
+        let pair = main_path(self, angle, Precision::F64, fused, Body::turned);
+        self.products = None;
+        pair
     }
 
     /// Exchanges sine and cosine in odd quadrants and gives them the quadrant's signs, by their bits.
