@@ -147,8 +147,7 @@ impl<S: Scalar> Interpreter<S> {
         sweeps.gaps(q, v, &inputs!(self), &mut self.work, [gaps, velocities, entries]);
     }
 
-    /// [`Interpreter::gaps`] of the constraints any of whose rows is `wanted`, one entry for each row. Numbers of the others
-    /// mean nothing.
+    /// [`Interpreter::gaps`] of the rows that are `wanted`, one entry for each row. Numbers of the others mean nothing.
     pub fn gaps_of(
         &mut self,
         wanted: &[bool],

@@ -486,8 +486,32 @@ impl<S> Tree<S> {
         }
         self.solve_at_ground.retain(|&g| !silent(g));
         self.constraints.retain(|c| acts[rows(c)].contains(&true));
+        // Only shapes with many corners are worth the code.
+        #[cfg(feature = "hulls")]
+        self.retain_unknowns();
         self.accelerations = self.accelerations.map(|tree| alloc::boxed::Box::new(tree.acting(acts)));
         self
+    }
+
+    /// Leaves out the unknowns of constraints that were removed: sweeps do work for each, and their memory grows with the
+    /// square of the number.
+    #[cfg(feature = "hulls")]
+    fn retain_unknowns(&mut self) {
+        let mut kept = alloc::vec![false; self.unknowns.len()];
+        let slots = self.constraints.iter().flat_map(|c| c.passes.iter().chain([&c.slots]).flatten());
+        slots.for_each(|&g| kept[g] = true);
+        let stays = |(kept, unknown): (&bool, &Unknown)| *kept || matches!(unknown, Unknown::Velocity(_));
+        let mut free = 0..;
+        let numbers: Vec<Option<usize>> =
+            kept.iter().zip(&self.unknowns).map(|of| if stays(of) { free.next() } else { None }).collect();
+        let mut each = numbers.iter();
+        self.unknowns.retain(|_| each.next().is_some_and(Option::is_some));
+        // Columns of the others are closed: what is left has a number.
+        let renumber = |g: &mut usize| *g = numbers[*g].unwrap_or(*g);
+        self.nodes.iter_mut().flat_map(|node| node.elimination.unknowns_mut()).for_each(renumber);
+        self.solve_at_ground.iter_mut().for_each(renumber);
+        let slots = self.constraints.iter_mut().flat_map(|c| c.passes.iter_mut().chain([&mut c.slots]).flatten());
+        slots.for_each(renumber);
     }
 
     /// The same mechanism in which [rows act by numbers](Tree::row_factors): one factor for each row.

@@ -189,8 +189,10 @@ pub struct Constraints<S> {
     pub through: Vec<Vec<(usize, usize)>>,
     /// Wrenches at each constraint's frames, carried inward along the paths.
     pub end_wrenches: Vec<[Force<S>; 2]>,
-    /// Constraints whose rows are left out: only gaps are asked for without some.
+    /// Constraints all of whose rows are left out: only gaps are asked for without some.
     pub left_out: Vec<bool>,
+    /// Rows that are left out.
+    pub rows_left_out: Vec<bool>,
     /// Relative pose of each constraint's frames.
     pub relative: Vec<Relative<S>>,
     /// Rows.
@@ -339,6 +341,7 @@ impl<S: Scalar> Workspace<S> {
                 end_wrenches: vec![[Force::zero(); 2]; tree.constraints.len()],
                 reach: vec![[([[o; 3]; 3], [o; 3]); 2]; tree.constraints.len()],
                 left_out: vec![false; tree.constraints.len()],
+                rows_left_out: vec![false; tree.dims.rows],
                 relative: vec![Relative { turn: [[o; 3]; 3], d: [o; 3] }; tree.constraints.len()],
                 rows: vec![
                     RowState { e: Force::zero(), at_a: Force::zero(), at_b: Force::zero(), residual: o };

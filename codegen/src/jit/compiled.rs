@@ -53,7 +53,7 @@ pub struct Compiled<S: Number = f64> {
     pub(super) interpreted: bool,
     /// Number of calls of an output that the interpreter computes before the output is compiled.
     patience: u32,
-    /// Whether one of these two has to be asked.
+    /// Whether one of these two has to be asked, unless an output has been called that often.
     pub(super) asks: bool,
     /// Calls of each of [`Output::ALL`], counted up to that number.
     calls: Vec<u32>,
@@ -293,6 +293,12 @@ impl<S: Number> Compiled<S> {
         Ok(())
     }
 
+    /// Whether an output is, or may be, still interpreted although its code is made.
+    #[inline(always)]
+    pub(super) fn waits(&self, output: Output) -> bool {
+        self.asks && (self.interpreted || self.calls.get(output as usize) != Some(&self.patience))
+    }
+
     /// Computes an output that one of the traits asks for, whose arrays are right. Returns whether there is code for
     /// it.
     #[inline(always)]
@@ -302,7 +308,7 @@ impl<S: Number> Compiled<S> {
         arguments: [&[S]; 3],
         mut results: [&mut [S]; N],
     ) -> bool {
-        let done = self.shared.made(output).filter(|_| !self.asks).is_some_and(|code| {
+        let done = self.shared.made(output).filter(|_| !self.waits(output)).is_some_and(|code| {
             let results = results.each_mut().map(|result| &mut **result);
             code.call_lean(arguments, &self.interpreter.tau, results, &mut self.scratch)
         });

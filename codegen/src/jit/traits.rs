@@ -38,7 +38,7 @@ impl<S: Number> System for Compiled<S> {
 
     #[inline]
     fn rates_at(&mut self, t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
-        let code = self.shared.made(Output::Rates).filter(|_| !self.asks && self.drives.is_none());
+        let code = self.shared.made(Output::Rates).filter(|_| !self.waits(Output::Rates) && self.drives.is_none());
         let done = code.is_some_and(|code| {
             // The vectors are looked into last, which leaves more registers.
             code.call_lean([q, p, &[]], &self.interpreter.tau, [qd, pd], &mut self.scratch)

@@ -26,7 +26,7 @@ pub use sines::{limit, reduced, within_quadrant};
 use straight::Lowering;
 
 /// An array that a function reads or writes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Array {
     /// Input array of this number, in the order of [`OutputProgram::inputs`].
     Input(usize),

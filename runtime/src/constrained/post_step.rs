@@ -76,7 +76,9 @@ pub struct WithPostStep<Y: System, M, B> {
     method: M,
     /// The change at the ends of steps.
     pub post_step: B,
+    /// The displacement of the last attempt after the work, where there was any; otherwise it is the method's own.
     delta: Point<Y>,
+    worked: bool,
     end: Point<Y>,
     end_known: bool,
     old: (Y::Coordinates, Y::Momenta),
@@ -98,6 +100,7 @@ where
             method,
             post_step,
             delta: Point::zero(system),
+            worked: false,
             end: Point::zero(system),
             end_known: false,
             old: state(),
@@ -110,13 +113,10 @@ where
         &self.method
     }
 
-    /// Changes a displacement that ends at time `t` by the work at the end of the step: `other`, or that of the last
-    /// attempt.
+    /// Changes a displacement that ends at time `t` by the work at the end of the step, which is not idle: `other`, or that of
+    /// the last attempt.
     fn close(&mut self, system: &mut Y, t: Y::Scalar, other: Option<&mut Point<Y>>) -> Result<(), ConstraintError> {
         let WithPostStep { method, post_step, delta, old, new: (q, p), .. } = self;
-        if post_step.idle(system, t) {
-            return Ok(());
-        }
         let (remembers, point) = (method.remembers(), other.unwrap_or(delta));
         method.parts().0.chart().state(system, point, &mut old.0, &mut old.1);
         q.as_mut().copy_from_slice(old.0.as_ref());
@@ -132,7 +132,7 @@ where
     /// The method takes the displacement as the work at the end of the step left it.
     fn hand_over(&mut self) {
         let delta = self.method.parts().1;
-        if delta.parts() != self.delta.parts() {
+        if core::mem::take(&mut self.worked) && delta.parts() != self.delta.parts() {
             delta.copy_from(&self.delta);
             self.method.corrected();
             if self.end_known {
@@ -192,12 +192,16 @@ where
         h: Y::Scalar,
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
+        (self.worked, self.end_known) = (false, false);
         let error = self.method.attempt(system, t, h, scale)?;
-        let delta = self.method.parts().1;
-        self.delta.copy_from(delta);
-        self.end_known = false;
         // A step that will be rejected is not changed.
-        if error <= 1.0 && delta.not_finite().is_none() {
+        if error <= 1.0 && !self.post_step.idle(system, t + h) {
+            let delta = self.method.parts().1;
+            if delta.not_finite().is_some() {
+                return Ok(error);
+            }
+            self.delta.copy_from(delta);
+            self.worked = true;
             let result = self.close(system, t + h, None);
             result.map_err(|error| StepError::Constraint { time: t.to_f64(), error })?;
         }
@@ -209,7 +213,8 @@ where
     }
 
     fn parts(&mut self) -> (&mut Field<Y>, &mut Point<Y>) {
-        (self.method.parts().0, &mut self.delta)
+        let (field, own) = self.method.parts();
+        (field, if self.worked { &mut self.delta } else { own })
     }
 
     fn start_rate(&mut self, system: &mut Y, t: Y::Scalar) -> &Point<Y> {
@@ -221,7 +226,7 @@ where
             return &self.end;
         }
         // Where the end was not changed, the rate there is the method's own.
-        if self.method.parts().1.parts() == self.delta.parts() {
+        if !self.worked || self.method.parts().1.parts() == self.delta.parts() {
             return self.method.end_rate(system, t, h);
         }
         self.method.parts().0.rates(system, t + h, &self.delta, &mut self.end);
@@ -244,15 +249,23 @@ where
     /// The method's interpolation, changed by the work; where this fails, the method's interpolation.
     fn interpolate(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar, theta: Y::Scalar, out: &mut Point<Y>) {
         self.method.interpolate(system, t, h, theta, out);
-        // The displacement is changed last, when nothing can fail any more.
-        let _ = self.close(system, t + theta * h, Some(out));
+        if !self.post_step.idle(system, t + theta * h) {
+            // The displacement is changed last, when nothing can fail any more.
+            let _ = self.close(system, t + theta * h, Some(out));
+        }
     }
 
     fn corrected(&mut self) {
         self.end_known = false;
+        if !self.worked {
+            self.method.corrected();
+        }
     }
 
     fn know_end_rate(&mut self, rate: &Point<Y>) {
+        if !self.worked {
+            return self.method.know_end_rate(rate);
+        }
         self.end.copy_from(rate);
         self.end_known = true;
     }

@@ -48,6 +48,13 @@ impl<Y: Constrained> Room<Y> {
         }
     }
 
+    /// What no row gives.
+    fn clear(&mut self) {
+        for rows in [&mut self.residual, &mut self.sigma, &mut self.pivots] {
+            rows.as_mut().fill(Y::Scalar::zero());
+        }
+    }
+
     /// Adds to the momenta the multipliers of which they were freed, at positions that have been corrected since.
     fn give_back(&mut self, system: &mut Y, q: &Y::Coordinates, p: &mut Y::Momenta) {
         system.constraint_residuals(q, &mut self.residual, &mut self.entries);
@@ -102,7 +109,7 @@ pub trait Policy<Y: Constrained> {
 
 /// Exactly `N` iterations with [`Stabilisation::Mass`], whatever the residuals are: nothing is compared with a
 /// tolerance, and numbers stay in the precision of the system. One projection of momenta and one solve for each
-/// iteration.
+/// iteration; nothing while no row acts, because all contacts are open.
 #[derive(Clone, Copy, Debug)]
 pub struct FixedWork<const N: usize>;
 
@@ -132,6 +139,14 @@ where
             room.give_back(system, q, p);
         }
         Ok(())
+    }
+
+    fn idle(&mut self, room: &mut Room<Y>, system: &Y, _t: Y::Scalar) -> bool {
+        if system.rows_act() {
+            return false;
+        }
+        room.clear();
+        true
     }
 }
 
@@ -285,9 +300,7 @@ where
         if system.rows_act() {
             return false;
         }
-        [&mut room.residual, &mut room.sigma, &mut room.pivots]
-            .into_iter()
-            .for_each(|rows| rows.as_mut().fill(Y::Scalar::zero()));
+        room.clear();
         (self.corrector.found, self.corrector.rank) = (Y::Scalar::zero(), 0);
         self.corrector.note(system, t, &room.pivots);
         (self.corrector.reordered, self.gave_back) = (false, false);

@@ -45,8 +45,8 @@ pub trait Reducible: Constrained<Scalar: Real> + Energetic + Conjugate + Sized {
         false
     }
 
-    /// [`Reducible::gaps`] of the constraints any of whose rows is `wanted`, one entry for each row, at `(q, v)`. Numbers of the
-    /// others mean nothing.
+    /// [`Reducible::gaps`] of the rows that are `wanted`, one entry for each row, at `(q, v)`. Numbers of the others mean
+    /// nothing.
     fn gaps_of(
         &mut self,
         _wanted: &[bool],
@@ -356,19 +356,20 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
 
     fn gaps_of(
         &mut self,
-        of: &[bool],
+        [of, whole]: [&[bool]; 2],
         t: Y::Scalar,
         (q, v): (&Y::Coordinates, &Y::Momenta),
         gaps: &mut Y::Rows,
         velocities: &mut Y::Rows,
         entries: &mut Y::Entries,
     ) {
-        if !of.contains(&false) {
+        if !of.contains(&false) && !whole.contains(&false) {
             return self.gaps(t, q, v, gaps, velocities, entries);
         }
         let ModeTable { full, modes, current, contacts, wanted, .. } = self;
-        for (contact, of) in contacts.iter().zip(of) {
-            wanted[contact.row..][..contact.rows()].fill(*of);
+        for (contact, (of, whole)) in contacts.iter().zip(of.iter().zip(whole)) {
+            wanted[contact.row..][..contact.rows()].fill(*of && *whole);
+            wanted[contact.row] = *of;
         }
         let current = &mut modes[*current].1;
         full.swap_inputs(current);

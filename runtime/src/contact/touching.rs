@@ -66,11 +66,12 @@ pub trait Touching: Constrained<Scalar: Real> {
     fn sees_parts(&self) -> bool {
         false
     }
-    /// [`Touching::gaps`] of some contacts, with one entry of `of` for each, and of the rows that are no contacts'. Numbers of
-    /// other contacts mean nothing afterwards: those of all of them may be computed, or not.
+    /// [`Touching::gaps`] of some contacts, with one entry for each in the first list, and of the rows that are no contacts'. Of
+    /// those that the second list does not have, only the normal rows are asked for. Numbers of other rows mean nothing
+    /// afterwards: those of all of them may be computed, or not.
     fn gaps_of(
         &mut self,
-        _of: &[bool],
+        _of: [&[bool]; 2],
         t: Self::Scalar,
         (q, v): (&Self::Coordinates, &Self::Momenta),
         gaps: &mut Self::Rows,

@@ -256,20 +256,43 @@ impl<Y: Touching> WithContacts<Y> {
     pub(super) fn look(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
         self.free(t, q, p);
         let Contacts { v, gaps, velocities, entries, .. } = &mut self.at;
-        self.system.gaps_of(self.minded.as_ref(), t, (q, v), gaps, velocities, entries);
+        self.system.gaps_of([self.minded.as_ref(); 2], t, (q, v), gaps, velocities, entries);
+    }
+
+    /// [`WithContacts::look`] that sees only gaps and their rates of the contacts that are open.
+    pub(super) fn glance(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
+        if !cfg!(feature = "hulls") {
+            // With few corners, it is not worth its code.
+            return self.look(t, q, p);
+        }
+        self.free(t, q, p);
+        let Contacts { v, gaps, velocities, entries, .. } = &mut self.at;
+        let of = [self.minded.as_ref(), self.pressed.as_ref()];
+        self.system.gaps_of(of, t, (q, v), gaps, velocities, entries);
     }
 
     /// [`WithContacts::look`] at those contacts only that are closed.
     fn look_at_closed(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
         self.free(t, q, p);
         let Contacts { v, gaps, velocities, entries, .. } = &mut self.at;
-        self.system.gaps_of(self.pressed.as_ref(), t, (q, v), gaps, velocities, entries);
+        self.system.gaps_of([self.pressed.as_ref(); 2], t, (q, v), gaps, velocities, entries);
     }
 
     /// [`WithContacts::look`] at all contacts, all of which are minded then.
     pub(super) fn look_at_all(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
         self.minded.as_mut().fill(true);
         self.look(t, q, p);
+    }
+
+    /// [`WithContacts::glance`] at all contacts, all of which are minded then.
+    pub(super) fn glance_at_all(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
+        self.minded.as_mut().fill(true);
+        self.glance(t, q, p);
+    }
+
+    /// Exchanges the contacts that are minded with others.
+    pub(super) fn exchange_minded(&mut self, others: &mut Y::PerContact<bool>) {
+        core::mem::swap(&mut self.minded, others);
     }
 
     /// Whether contact `k` is minded.

@@ -148,7 +148,12 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Before the first [`Sweeps::reach_node`].
     fn reach_begin(&self, w: &mut Workspace<S>) {
         let (o, one) = (S::zero(), S::one());
-        w.constraints.reach.fill([([[one, o, o], [o, one, o], [o, o, one]], [o; 3]); 2]);
+        let start = [([[one, o, o], [o, one, o], [o, o, one]], [o; 3]); 2];
+        if !self.leaves_out(w) {
+            return w.constraints.reach.fill(start);
+        }
+        let each = w.constraints.reach.iter_mut().zip(&w.constraints.left_out);
+        each.filter(|(_, left_out)| !**left_out).for_each(|(reach, _)| *reach = start);
     }
 
     /// The steps from its parent to node `i` in the paths of the cuts that go through it, after its parent. Relative
@@ -198,6 +203,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let directions = cut.closure.directions(&at);
         w.constraints.relative[index] = at;
         for (k, r) in constraint.range().enumerate() {
+            if self.leaves_out_row(w, r) {
+                continue;
+            }
             let row = &mut w.constraints.rows[r];
             (row.e, row.residual) = (directions[k], self.if_acts(constraint.first, residuals[k]));
             (row.at_a, row.at_b) = self.at_nodes(cut, &at, &directions[k], &w.poses);
@@ -433,15 +441,35 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         all.filter(|(index, _)| !w.constraints.left_out[*index])
     }
 
+    /// Whether some rows are left out: their results are not touched then. That is worth its code for shapes with many corners
+    /// only.
+    fn leaves_out(&self, w: &Workspace<S>) -> bool {
+        cfg!(feature = "hulls") && w.constraints.rows_left_out.contains(&true)
+    }
+
+    /// Whether row `r` is left out.
+    fn leaves_out_row(&self, w: &Workspace<S>, r: usize) -> bool {
+        cfg!(feature = "hulls") && w.constraints.rows_left_out[r]
+    }
+
     /// Entries of `Φ`, placed as [`Tree::entry_columns`] says, after the rows.
     pub(super) fn row_entries(&self, w: &Workspace<S>, entries: &mut [S]) {
-        entries.fill(S::zero());
+        let parts = self.leaves_out(w);
+        if !parts {
+            entries.fill(S::zero());
+        }
         for (_, constraint) in self.wanted(w) {
             let bound = &constraint.velocities;
             self.trace.at(None, Quantity::Constraint);
             for (k, r) in constraint.range().enumerate() {
+                if self.leaves_out_row(w, r) {
+                    continue;
+                }
                 let first = constraint.entry + k * bound.len();
                 let entries = &mut entries[first..first + bound.len()];
+                if parts {
+                    entries.fill(S::zero());
+                }
                 let mut put = |v: usize, x: S| {
                     if let Ok(at) = bound.binary_search(&v) {
                         entries[at] = entries[at] + self.if_acts(constraint.first, x);
@@ -467,19 +495,25 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Velocities of the rows after a velocity sweep: of cuts along their directions, of couplings from the rates of
     /// their nodes.
     pub(super) fn velocities_of_rows(&self, w: &Workspace<S>, out: &mut [S]) {
-        out.fill(S::zero());
+        let parts = self.leaves_out(w);
+        if !parts {
+            out.fill(S::zero());
+        }
         for (index, constraint) in self.wanted(w) {
             match &constraint.bond {
                 Bond::Cut(cut) => {
                     let at = &w.constraints.relative[index];
                     let [a, b] = [&cut.a, &cut.b].map(|frame| self.frame_motion(frame, w));
                     let relative = difference(&b, &at.motion(&a));
-                    for r in constraint.range() {
+                    for r in constraint.range().filter(|r| !self.leaves_out_row(w, *r)) {
                         out[r] = w.constraints.rows[r].e.dot(&relative);
                     }
                 }
                 Bond::Coupling { terms, .. } => {
                     let r = constraint.first;
+                    if parts {
+                        out[r] = S::zero();
+                    }
                     for (i, ratio) in terms {
                         out[r] = out[r] + *ratio * w.velocity.rate[w.first[*i]];
                     }
@@ -490,6 +524,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
     /// Residuals of the positions.
     pub(super) fn residuals(&self, w: &Workspace<S>, phi: &mut [S]) {
+        if self.leaves_out(w) {
+            let rows = self.wanted(w).flat_map(|(_, constraint)| constraint.range());
+            let rows = rows.filter(|r| !self.leaves_out_row(w, *r));
+            return rows.for_each(|r| phi[r] = w.constraints.rows[r].residual);
+        }
         for (phi, row) in phi.iter_mut().zip(&w.constraints.rows) {
             *phi = row.residual;
         }

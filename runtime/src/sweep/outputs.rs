@@ -321,8 +321,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         self.row_entries(w, entries);
     }
 
-    /// [`Sweeps::gaps`] of the constraints any of whose rows is `wanted`, one entry for each row. Numbers of the others mean
-    /// nothing.
+    /// [`Sweeps::gaps`] of the rows that are `wanted`, one entry for each row. Numbers of the others mean nothing.
     pub fn gaps_of(
         &self,
         wanted: &[bool],
@@ -334,8 +333,16 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for (left_out, constraint) in w.constraints.left_out.iter_mut().zip(&self.tree.constraints) {
             *left_out = constraint.range().all(|row| wanted.get(row) == Some(&false));
         }
+        if cfg!(feature = "hulls") {
+            for (left_out, wanted) in w.constraints.rows_left_out.iter_mut().zip(wanted) {
+                *left_out = !wanted;
+            }
+        }
         self.gaps(q, v, u, w, results);
         w.constraints.left_out.fill(false);
+        if cfg!(feature = "hulls") {
+            w.constraints.rows_left_out.fill(false);
+        }
     }
 
     /// Articulated inertia with all freedoms and unknowns eliminated.

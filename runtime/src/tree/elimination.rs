@@ -93,4 +93,11 @@ impl Elimination {
             list.retain(|&g| keep(g));
         }
     }
+
+    /// All numbers of unknowns.
+    #[cfg(feature = "hulls")]
+    pub(crate) fn unknowns_mut(&mut self) -> impl Iterator<Item = &mut usize> {
+        let Elimination { unknown, ends, screws, open, solve_before, solve_after, .. } = self;
+        unknown.iter_mut().chain([ends, screws, open, solve_before, solve_after].into_iter().flatten())
+    }
 }

@@ -4,6 +4,7 @@
 //! loops, both precisions.
 
 use std::collections::BTreeSet;
+#[cfg(target_arch = "x86_64")]
 use std::process::Command;
 
 use mbd_codegen::jit::{best_lanes, CompileError, Compiled, Number};
@@ -11,6 +12,7 @@ use mbd_codegen::model::Model;
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::{search, Arithmetic, Options, Output, Precision, RolledCode};
+#[cfg(target_arch = "x86_64")]
 use mbd_runtime::kernel::{self, Level};
 use mbd_runtime::{
     Accelerated, Conjugate, Constrained, Differentiable, Energetic, Interpreter, Packed, Scalar, System,
@@ -123,11 +125,13 @@ fn rolled_code() {
 }
 
 /// The environment variable that tells [`at_a_lower_level`] the level.
+#[cfg(target_arch = "x86_64")]
 const LEVEL: &str = "MBD_TEST_LEVEL";
 
 /// Processors with fewer instructions than this one: other machine code, with fewer registers or by Cranelift. The level holds
 /// for a whole program, so that each has one of its own.
 #[test]
+#[cfg(target_arch = "x86_64")]
 fn lower_levels() {
     for level in [Level::Fused, Level::Plain].into_iter().filter(|level| *level < kernel::level()) {
         let program = std::env::current_exe().expect("this program has a path");
@@ -142,6 +146,7 @@ fn lower_levels() {
 }
 
 #[test]
+#[cfg(target_arch = "x86_64")]
 #[ignore = "`lower_levels` runs it, with the level in the environment"]
 fn at_a_lower_level() {
     let Ok(wanted) = std::env::var(LEVEL) else { return };

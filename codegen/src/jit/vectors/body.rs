@@ -149,6 +149,8 @@ pub struct Body {
     constants: BTreeMap<(u64, Lanes), Id>,
     /// The bits of these.
     bits: BTreeMap<Id, u64>,
+    /// Products of the sine and cosine that are being recorded, which have some in common.
+    products: Option<BTreeMap<(Id, Id), Id>>,
 }
 
 /// A loop that is being recorded: first place of what it carries.
@@ -171,6 +173,43 @@ impl Body {
             stored: BTreeMap::new(),
             constants: BTreeMap::new(),
             bits: BTreeMap::new(),
+            products: None,
+        }
+    }
+
+    /// Numbers that blocks have left in the working memory are read where they are used, if they are still there then: a block
+    /// is given more of them than there are registers. In loops they are read at the beginning of a turn.
+    pub fn read_in_place(&mut self) {
+        if self.items.iter().any(|item| matches!(item, Item::Open { .. })) {
+            return;
+        }
+        let mut last_use = vec![0; self.lanes.len()];
+        for (k, item) in self.items.iter().enumerate() {
+            let mut uses = |id: Id| last_use[id as usize] = k;
+            match item {
+                Item::Value(_, step) => step.operands().for_each(&mut uses),
+                Item::Store(_, id) | Item::ExitIfSigns(id) | Item::CallIfSigns(id, _) => uses(*id),
+                Item::Call(_) | Item::Open { .. } | Item::Close { .. } => {}
+            }
+        }
+        // When an entry is written next.
+        let mut written = BTreeMap::new();
+        for (k, item) in self.items.iter_mut().enumerate().rev() {
+            match item {
+                Item::Store(entry, id) => {
+                    let all = entry.at..entry.at + self.lanes[*id as usize].count();
+                    written.extend(all.map(|at| ((entry.array, at), k)));
+                }
+                Item::Value(id, step) => {
+                    let Step::Load(entry @ Entry { array: Array::Rows(_) | Array::Kept, .. }) = *step else { continue };
+                    let mut all = entry.at..entry.at + self.lanes[*id as usize].count();
+                    let last = last_use[*id as usize];
+                    if all.all(|at| written.get(&(entry.array, at)).is_none_or(|k| *k > last)) {
+                        *step = Step::Again(entry);
+                    }
+                }
+                _ => {}
+            }
         }
     }
 
@@ -228,7 +267,16 @@ impl Body {
     }
 
     fn product(&mut self, operation: Binary, a: Signed, b: Signed) -> Signed {
-        Signed { id: self.binary(operation, a.id, b.id), minus: a.minus != b.minus }
+        let (factors, minus) = ((a.id.min(b.id), a.id.max(b.id)), a.minus != b.minus);
+        let known = self.products.as_ref().filter(|_| operation == Binary::Mul);
+        if let Some(id) = known.and_then(|products| products.get(&factors)) {
+            return Signed { id: *id, minus };
+        }
+        let id = self.binary(operation, a.id, b.id);
+        if let (Some(products), Binary::Mul) = (&mut self.products, operation) {
+            products.insert(factors, id);
+        }
+        Signed { id, minus }
     }
 
     /// A value whose signs are set where angles are beyond the range of the main path.
@@ -254,7 +302,10 @@ impl Body {
 
     fn pair(&mut self, angle: Signed) -> [Signed; 2] {
         let fused = self.fused;
-        main_path(self, angle, Precision::F64, fused, Body::turned)
+        self.products = Some(BTreeMap::new());
+        let pair = main_path(self, angle, Precision::F64, fused, Body::turned);
+        self.products = None;
+        pair
     }
 
     /// Exchanges sine and cosine in odd quadrants and gives them the quadrant's signs, by their bits.

@@ -126,6 +126,7 @@ pub fn compile(
     };
     let mut body = Body::new(fused, width, branches);
     lower(&mut body, program, results, &[]);
+    body.read_in_place();
     let inputs = input_places(&program.inputs);
     let block = if width.states == Lanes::One { BLOCK } else { 1 };
     let memory = Memory::new(&program.program, &[], block, branches);

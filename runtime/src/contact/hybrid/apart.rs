@@ -78,11 +78,15 @@ where
     /// Whether the joints have not moved by more than is allowed since the reserves were known, with the last step.
     fn coasts(&mut self, system: &mut WithContacts<Y>) -> bool {
         let [moved, _] = self.solver.travel(system, [true, true], false);
-        let (gone, moved) = (self.gone.as_mut(), moved.as_ref());
-        let within =
-            gone.iter().zip(moved).zip(self.allowed.as_ref()).all(|((gone, moved), most)| *gone + *moved <= *most);
+        let (gone, moved) = (self.gone.as_mut(), moved.as_mut());
+        // No loop ends early, so that they become vector instructions.
+        let mut within = true;
+        for ((gone, moved), most) in gone.iter().zip(moved.iter_mut()).zip(self.allowed.as_ref()) {
+            *moved = *gone + *moved;
+            within &= *moved <= *most;
+        }
         if within {
-            gone.iter_mut().zip(moved).for_each(|(gone, moved)| *gone = *gone + *moved);
+            copy(gone, moved);
         }
         within
     }
@@ -140,7 +144,7 @@ where
             return false;
         }
         let (t, h) = self.solver.last_step();
-        system.look_at_all(t + h, &self.q, &self.p);
+        system.glance_at_all(t + h, &self.q, &self.p);
         self.fill_all(system);
         self.mind_near(system);
         // Loads are those of the contacts that are closed, which are minded before and after.
@@ -183,6 +187,21 @@ where
         let (end, travel) = (self.end.as_ref().get(k), self.travel.as_ref().get(k));
         let apart = || end.zip(travel).is_some_and(|(end, travel)| end.first > *travel);
         system.mode(k) == Mode::Open && (self.ignores(k) || !system.minds(k) || apart())
+    }
+
+    /// Minds only the contacts that are not far in the last step, or those again that were minded before.
+    pub(super) fn mind_searched(&mut self, system: &mut WithContacts<Y>, only: bool) {
+        if !cfg!(feature = "hulls") {
+            // With few corners, it is not worth its code.
+            return;
+        }
+        if only {
+            for k in 0..self.count(system) {
+                let near = !self.is_far(system, k);
+                set(self.near.as_mut(), k, near);
+            }
+        }
+        system.exchange_minded(&mut self.near);
     }
 
     /// How far bodies whose contacts may have changed in the last step turn in it, in units of the angle within which

@@ -32,7 +32,7 @@ where
         }
         self.step_to(system, time)?;
         // What is left of the gap is an error of the dense output, or an overlap: the step ends a little sooner or later.
-        system.look(time, &self.q, &self.p);
+        system.glance(time, &self.q, &self.p);
         let mut gap = system.gap(found.contact);
         for _ in 0..CORRECTIONS {
             let dt = -(gap / system.gap_rate(found.contact));
@@ -41,7 +41,7 @@ where
             }
             time = time + dt;
             self.step_to(system, time)?;
-            system.look(time, &self.q, &self.p);
+            system.glance(time, &self.q, &self.p);
             let left = system.gap(found.contact);
             if !(left.abs() < gap.abs()) {
                 break;

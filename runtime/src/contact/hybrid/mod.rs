@@ -286,6 +286,8 @@ pub struct Hybrid<Y: Touching, M> {
     allowed: Y::Momenta,
     /// Whether coordinates add to the arms of rotations.
     slides: bool,
+    /// The contacts that are minded while a step is searched, and those that are besides.
+    near: Y::PerContact<bool>,
     departures: Y::PerContact<Departure<Y::Scalar>>,
     touching: Touches<Y>,
     /// Contacts that are left open whatever their gaps are.
@@ -360,6 +362,7 @@ where
             gone: inner.zero_momenta(),
             allowed: inner.zero_momenta(),
             slides: inner.reaches().iter().any(|reach| reach.slide != zero),
+            near: inner.per_contact(false),
             departures: inner.per_contact(departure),
             touching: Touches::new(inner),
             ignored: inner.per_contact(false),
@@ -512,10 +515,6 @@ where
             solver.state(system, &mut start.1, &mut start.2);
             return Err(error.into());
         }
-        if !held {
-            // The same, without a computation.
-            solver.start(system, &mut start.1, &mut start.2);
-        }
         if let Some(steps) = self.statistics.steps.get_mut(system.system().way() as usize) {
             *steps += 1;
         }
@@ -532,6 +531,14 @@ where
             observer.event(system, event);
         }
         Ok(event)
+    }
+
+    /// Notes the state where the last step began, if [`Hybrid::advance`] has not: a step that is not searched needs none.
+    fn note_start(&mut self, system: &WithContacts<Y>) {
+        if !system.rows_act() {
+            let Hybrid { solver, start, .. } = self;
+            solver.start(system, &mut start.1, &mut start.2);
+        }
     }
 
     /// Takes back what rounding moves where nothing can move: a step without events then ends where it started.

@@ -86,7 +86,7 @@ where
 {
     /// Evaluates the functions at the state in `self.q`, `self.p`.
     pub(super) fn evaluate(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, right: bool) {
-        system.look(t, &self.q, &self.p);
+        system.glance(t, &self.q, &self.p);
         if !system.is_open() {
             system.loads(t, &self.q, true);
         }
@@ -120,7 +120,7 @@ where
     ) -> Y::Scalar {
         let (t, h) = self.solver.last_step();
         self.solver.dense(system, theta, &mut self.q, &mut self.p);
-        system.look(t + theta * h, &self.q, &self.p);
+        system.glance(t + theta * h, &self.q, &self.p);
         if system.mode(k) != Mode::Open {
             system.loads(t + theta * h, &self.q, true);
         }
@@ -141,6 +141,7 @@ where
             self.rests = false;
             return Ok(None);
         }
+        self.note_start(system);
         self.sample(system, one, true);
         self.rests = system.at_rest();
         self.travel_with_end(system);
@@ -163,6 +164,7 @@ where
             return Err(HybridError::TurnsTooFar { time: t.to_f64(), angle: turn * TURN });
         }
         let stretches = libm::ceil(turn).max(f64::from(STRETCHES)) as u32;
+        self.mind_searched(system, true);
         let mut from = zero;
         for j in 1..=stretches {
             let to = Y::Scalar::constant(f64::from(j) / f64::from(stretches));
@@ -187,6 +189,7 @@ where
             self.move_on();
             from = to;
         }
+        self.mind_searched(system, false);
         self.go_on(system, others);
         match self.creeps(system) {
             Some(contact) => Ok(Some(Found { contact, cause: Cause::Stopped, theta: one })),
