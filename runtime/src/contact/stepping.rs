@@ -9,8 +9,8 @@
 //! with its velocity `v_n` after the impulses and its gap `g = g₁ − h v₁/2` in the middle of the step, from gap and rate at the
 //! end without contacts, and Coulomb's law on the exact cone. What lands between the middles of two steps gets a part of its
 //! impulse in each, so that the time of both, in the mean, is that at which it lands. So it does not overlap, but for the
-//! curvature of its path; what overlaps all the same is taken apart by coordinates alone. With restitution, a contact waits until its gap in
-//! the middle is closed, and then collides as in an [`impact`]; one whose approach is not faster than twice what forces add
+//! curvature of its path; what overlaps all the same is taken apart by coordinates alone. With restitution, a contact waits
+//! until its gap in the middle is closed, and then collides as in an [`impact`]; one whose approach is not faster than twice what forces add
 //! in a step has none.
 //!
 //! Springs and dampers of the joints follow the implicit midpoint rule where the mechanism can do that

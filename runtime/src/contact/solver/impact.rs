@@ -84,7 +84,8 @@ pub fn impact<S: Real>(
     judged(problem, impulses, result)
 }
 
-/// [`impact`] from impulses that solve a problem nearby: without restitution and all at once, the search begins there. One contact alone is solved exactly, wherever the search begins.
+/// [`impact`] from impulses that solve a problem nearby: without restitution and all at once, the search begins there. One
+/// contact alone is solved exactly, wherever the search begins.
 ///
 /// # Errors
 /// As of [`impact`].
