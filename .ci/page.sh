@@ -23,10 +23,10 @@ RUSTC=/usr/bin/rustc RUSTC_BOOTSTRAP=1 RUSTFLAGS=$flags CARGO_TARGET_WASM32_UNKN
     --manifest-path "$manifest" --target-dir "$target/wasm" --lib -Zbuild-std=std,panic_abort \
     --target wasm32-unknown-unknown
 wasm=$target/wasm/wasm32-unknown-unknown/release/page.wasm
-# What the second run finds depends on the first.
-for passes in "-Oz --converge" "--local-cse -Oz"; do
-    wasm-opt $passes --enable-bulk-memory --enable-sign-ext --enable-nontrapping-float-to-int --strip-debug --strip-producers \
-        "$wasm" -o "$target/page.wasm"
+# What a run finds depends on those before.
+strip="--strip-debug --strip-producers"
+for passes in "-Oz --converge $strip" "--local-cse -Oz $strip" "-Oz --converge"; do
+    wasm-opt $passes --enable-bulk-memory --enable-sign-ext --enable-nontrapping-float-to-int "$wasm" -o "$target/page.wasm"
     wasm=$target/page.wasm
 done
 squeeze "$target/page.wasm" > cli/src/view/page.wasm.lzma
