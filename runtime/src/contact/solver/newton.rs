@@ -70,16 +70,14 @@ fn pressed<S: Real>(terms: &Terms<S>, touch: &Touch<S>, impulses: &[S], v: &[S])
 
 /// The equations of a contact, `F(P) = 0`, in `rhs`, and their derivatives by the impulses of the contacts that act, in `lines`;
 /// its own begin `at` a place.
-fn equations<'a, S: Real>(
+fn equations<'a, S: Real + 'a>(
     terms: &Terms<S>,
     (touch, at): (&Touch<S>, usize),
     all: impl Iterator<Item = &'a Touch<S>>,
     (impulses, v): (&[S], &[S]),
     lines: &mut [S],
     rhs: &mut [S],
-) where
-    S: 'a,
-{
+) {
     let (zero, one) = (S::zero(), S::one());
     let problem = terms.problem;
     let (n, c) = (problem.b.len(), touch.contact);
