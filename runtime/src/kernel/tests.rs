@@ -58,14 +58,12 @@ impl Kernel<0, 1, (&[f64; 3], &mut [f64; 2])> for Twice {
 fn long_kernels_have_the_bits_of_others() {
     let small = f64::powi(2.0, -30);
     let numbers = [1.0 + small, 1.0 - small, -1.0];
-    let of = |call: fn((&[f64; 3], &mut [f64; 2]))| {
-        let mut out = [f64::NAN; 2];
-        call((&numbers, &mut out));
-        out
-    };
-    let short = of(call::<Twice, 0, _>);
-    assert_eq!(short, [if level() == Level::Plain { 0.0 } else { -small * small }, 0.0]);
-    assert_eq!(of(call_long::<Twice, 0, _>), short);
-    assert_eq!(of(processor::call::<Twice, 0, 1, _, true>), short);
-    assert_eq!(of(call_exact::<Twice, 0, _>)[1], 0.0);
+    let [mut short, mut long, mut wide, mut exact] = [[f64::NAN; 2]; 4];
+    call::<Twice, 0, _>((&numbers, &mut short));
+    call_long::<Twice, 0, _>((&numbers, &mut long));
+    processor::call::<Twice, 0, 1, _, true>((&numbers, &mut wide));
+    call_exact::<Twice, 0, _>((&numbers, &mut exact));
+    let fused = if level() == Level::Plain { 0.0 } else { -small * small };
+    assert_eq!([short, long, wide], [[fused, 0.0]; 3]);
+    assert_eq!(exact[1], 0.0);
 }
