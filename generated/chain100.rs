@@ -539,7 +539,7 @@ impl Chain100 {
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 22323 operations: 10615 additions, 11609 multiplications, 99 divisions; apart: 0 square roots, 100 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 100], p: &[f64; 100], qd: &mut [f64; 100], pd: &mut [f64; 100]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 0, _>((q, p, &self.tau, qd, pd,));
+        ::multibody::runtime::kernel::call_exact::<Self, 0, true, _>((q, p, &self.tau, qd, pd,));
     }
 
     #[inline(always)]
@@ -1632,7 +1632,7 @@ impl Chain100 {
     /// Velocities from momenta.
     /// 16499 operations: 7655 additions, 8745 multiplications, 99 divisions; apart: 0 square roots, 99 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 100], p: &[f64; 100], v: &mut [f64; 100]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 1, _>((q, p, v,));
+        ::multibody::runtime::kernel::call_exact::<Self, 1, true, _>((q, p, v,));
     }
 
     #[inline(always)]
@@ -2399,7 +2399,7 @@ impl Chain100 {
     /// Momenta from velocities: `p = M(q) v`.
     /// 4445 operations: 1874 additions, 2571 multiplications, 0 divisions; apart: 0 square roots, 99 sine-cosine pairs.
     pub fn momenta(&self, q: &[f64; 100], v: &[f64; 100], p: &mut [f64; 100]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 2, _>((q, v, p,));
+        ::multibody::runtime::kernel::call_exact::<Self, 2, true, _>((q, v, p,));
     }
 
     #[inline(always)]
@@ -2806,7 +2806,7 @@ impl Chain100 {
     /// 17390 operations: 8050 additions, 9241 multiplications, 99 divisions; apart: 0 square roots, 100 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 100], p: &[f64; 100]) -> [f64; 2] {
         let mut energy = [0.0; 2];
-        ::multibody::runtime::kernel::call_exact::<Self, 3, _>((q, p, &mut energy,));
+        ::multibody::runtime::kernel::call_exact::<Self, 3, true, _>((q, p, &mut energy,));
         energy
     }
 

@@ -93,7 +93,7 @@ impl Chain10Planar {
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 806 operations: 350 additions, 447 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 10], p: &[f64; 10], qd: &mut [f64; 10], pd: &mut [f64; 10]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 0, _>((q, p, &self.tau, qd, pd,));
+        ::multibody::runtime::kernel::call_exact::<Self, 0, false, _>((q, p, &self.tau, qd, pd,));
     }
 
     #[inline(always)]
@@ -1130,7 +1130,7 @@ impl Chain10Planar {
     /// Velocities from momenta.
     /// 548 operations: 238 additions, 301 multiplications, 9 divisions; apart: 0 square roots, 9 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 10], p: &[f64; 10], v: &mut [f64; 10]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 1, _>((q, p, v,));
+        ::multibody::runtime::kernel::call_exact::<Self, 1, false, _>((q, p, v,));
     }
 
     #[inline(always)]
@@ -2161,7 +2161,7 @@ impl Chain10Planar {
     /// 601 operations: 261 additions, 331 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 10], p: &[f64; 10]) -> [f64; 2] {
         let mut energy = [0.0; 2];
-        ::multibody::runtime::kernel::call_exact::<Self, 3, _>((q, p, &mut energy,));
+        ::multibody::runtime::kernel::call_exact::<Self, 3, false, _>((q, p, &mut energy,));
         energy
     }
 
@@ -2904,7 +2904,7 @@ impl Chain10Planar {
     /// Accelerations: time derivatives `v̇` of the velocities.
     /// 605 operations: 260 additions, 336 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 10], v: &[f64; 10], a: &mut [f64; 10]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 4, _>((q, v, &self.tau, a,));
+        ::multibody::runtime::kernel::call_exact::<Self, 4, false, _>((q, v, &self.tau, a,));
     }
 
     #[inline(always)]
@@ -3721,7 +3721,7 @@ impl Chain10Planar {
     /// Mass matrix, by rows.
     /// 333 operations: 158 additions, 175 multiplications, 0 divisions; apart: 0 square roots, 9 sine-cosine pairs.
     pub fn mass_matrix(&self, q: &[f64; 10], m: &mut [[f64; 10]; 10]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 5, _>((q, m.as_flattened_mut(),));
+        ::multibody::runtime::kernel::call_exact::<Self, 5, false, _>((q, m.as_flattened_mut(),));
     }
 
     #[inline(always)]

@@ -70,7 +70,7 @@ impl Chain6 {
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 1129 operations: 508 additions, 616 multiplications, 5 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 0, _>((q, p, &self.tau, qd, pd,));
+        ::multibody::runtime::kernel::call_exact::<Self, 0, false, _>((q, p, &self.tau, qd, pd,));
     }
 
     #[inline(always)]
@@ -1363,7 +1363,7 @@ impl Chain6 {
     /// Velocities from momenta.
     /// 702 operations: 325 additions, 372 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 6], p: &[f64; 6], v: &mut [f64; 6]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 1, _>((q, p, v,));
+        ::multibody::runtime::kernel::call_exact::<Self, 1, false, _>((q, p, v,));
     }
 
     #[inline(always)]
@@ -2166,7 +2166,7 @@ impl Chain6 {
     /// Momenta from velocities: `p = M(q) v`.
     /// 433 operations: 180 additions, 253 multiplications, 0 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     pub fn momenta(&self, q: &[f64; 6], v: &[f64; 6], p: &mut [f64; 6]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 2, _>((q, v, p,));
+        ::multibody::runtime::kernel::call_exact::<Self, 2, false, _>((q, v, p,));
     }
 
     #[inline(always)]
@@ -2696,7 +2696,7 @@ impl Chain6 {
     /// 731 operations: 338 additions, 388 multiplications, 5 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 6], p: &[f64; 6]) -> [f64; 2] {
         let mut energy = [0.0; 2];
-        ::multibody::runtime::kernel::call_exact::<Self, 3, _>((q, p, &mut energy,));
+        ::multibody::runtime::kernel::call_exact::<Self, 3, false, _>((q, p, &mut energy,));
         energy
     }
 
@@ -3527,7 +3527,7 @@ impl Chain6 {
     /// Accelerations: time derivatives `v̇` of the velocities.
     /// 1363 operations: 622 additions, 736 multiplications, 5 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 6], v: &[f64; 6], a: &mut [f64; 6]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 4, _>((q, v, &self.tau, a,));
+        ::multibody::runtime::kernel::call_exact::<Self, 4, false, _>((q, v, &self.tau, a,));
     }
 
     #[inline(always)]

@@ -81,7 +81,7 @@ impl Panda {
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 934 operations: 437 additions, 490 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 8], p: &[f64; 8], qd: &mut [f64; 8], pd: &mut [f64; 8]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 0, _>((q, p, &self.tau, qd, pd,));
+        ::multibody::runtime::kernel::call_exact::<Self, 0, false, _>((q, p, &self.tau, qd, pd,));
     }
 
     #[inline(always)]
@@ -1192,7 +1192,7 @@ impl Panda {
     /// Velocities from momenta.
     /// 606 operations: 292 additions, 307 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 8], p: &[f64; 8], v: &mut [f64; 8]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 1, _>((q, p, v,));
+        ::multibody::runtime::kernel::call_exact::<Self, 1, false, _>((q, p, v,));
     }
 
     #[inline(always)]
@@ -1909,7 +1909,7 @@ impl Panda {
     /// Momenta from velocities: `p = M(q) v`.
     /// 369 operations: 164 additions, 205 multiplications, 0 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn momenta(&self, q: &[f64; 8], v: &[f64; 8], p: &mut [f64; 8]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 2, _>((q, v, p,));
+        ::multibody::runtime::kernel::call_exact::<Self, 2, false, _>((q, v, p,));
     }
 
     #[inline(always)]
@@ -2396,7 +2396,7 @@ impl Panda {
     /// 630 operations: 304 additions, 319 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 8], p: &[f64; 8]) -> [f64; 2] {
         let mut energy = [0.0; 2];
-        ::multibody::runtime::kernel::call_exact::<Self, 3, _>((q, p, &mut energy,));
+        ::multibody::runtime::kernel::call_exact::<Self, 3, false, _>((q, p, &mut energy,));
         energy
     }
 
@@ -3131,7 +3131,7 @@ impl Panda {
     /// Accelerations: time derivatives `v̇` of the velocities.
     /// 1224 operations: 593 additions, 624 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 8], v: &[f64; 8], a: &mut [f64; 8]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 4, _>((q, v, &self.tau, a,));
+        ::multibody::runtime::kernel::call_exact::<Self, 4, false, _>((q, v, &self.tau, a,));
     }
 
     #[inline(always)]

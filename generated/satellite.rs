@@ -1222,7 +1222,7 @@ impl Satellite {
     /// Accelerations: time derivatives `v̇` of the velocities.
     /// 352 operations: 173 additions, 176 multiplications, 3 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 7], v: &[f64; 6], a: &mut [f64; 6]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 4, _>((v, &self.tau, &self.drive_q, &self.drive_v, &self.drive_a, self.wrenches.as_flattened(), a,));
+        ::multibody::runtime::kernel::call_exact::<Self, 4, false, _>((v, &self.tau, &self.drive_q, &self.drive_v, &self.drive_a, self.wrenches.as_flattened(), a,));
     }
 
     #[inline(always)]
@@ -1696,7 +1696,7 @@ impl Satellite {
     /// Wrench `[force; moment]` that each joint transmits to its child, in the child's body frame, N and N m.
     /// 605 operations: 309 additions, 293 multiplications, 3 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     pub fn reactions(&self, q: &[f64; 7], v: &[f64; 6], reactions: &mut [[f64; 6]; 3]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 5, _>((v, &self.tau, &self.drive_q, &self.drive_v, &self.drive_a, self.wrenches.as_flattened(), reactions.as_flattened_mut(),));
+        ::multibody::runtime::kernel::call_exact::<Self, 5, false, _>((v, &self.tau, &self.drive_q, &self.drive_v, &self.drive_a, self.wrenches.as_flattened(), reactions.as_flattened_mut(),));
     }
 
     #[inline(always)]

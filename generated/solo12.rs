@@ -105,7 +105,7 @@ impl Solo12 {
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 2173 operations: 1061 additions, 1098 multiplications, 14 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 19], p: &[f64; 18], qd: &mut [f64; 19], pd: &mut [f64; 18]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 0, _>((q, p, &self.tau, qd, pd,));
+        ::multibody::runtime::kernel::call_exact::<Self, 0, false, _>((q, p, &self.tau, qd, pd,));
     }
 
     #[inline(always)]
@@ -4019,7 +4019,7 @@ impl Solo12 {
     /// Velocities from momenta.
     /// 1520 operations: 736 additions, 770 multiplications, 14 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 19], p: &[f64; 18], v: &mut [f64; 18]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 1, _>((q, p, v,));
+        ::multibody::runtime::kernel::call_exact::<Self, 1, false, _>((q, p, v,));
     }
 
     #[inline(always)]
@@ -6668,7 +6668,7 @@ impl Solo12 {
     /// Momenta from velocities: `p = M(q) v`.
     /// 650 operations: 294 additions, 356 multiplications, 0 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn momenta(&self, q: &[f64; 19], v: &[f64; 18], p: &mut [f64; 18]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 2, _>((q, v, p,));
+        ::multibody::runtime::kernel::call_exact::<Self, 2, false, _>((q, v, p,));
     }
 
     #[inline(always)]
@@ -7940,7 +7940,7 @@ impl Solo12 {
     /// 1602 operations: 780 additions, 808 multiplications, 14 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 19], p: &[f64; 18]) -> [f64; 2] {
         let mut energy = [0.0; 2];
-        ::multibody::runtime::kernel::call_exact::<Self, 3, _>((q, p, &mut energy,));
+        ::multibody::runtime::kernel::call_exact::<Self, 3, false, _>((q, p, &mut energy,));
         energy
     }
 
@@ -9759,7 +9759,7 @@ impl Solo12 {
     /// Accelerations: time derivatives `v̇` of the velocities.
     /// 2426 operations: 1176 additions, 1236 multiplications, 14 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 19], v: &[f64; 18], a: &mut [f64; 18]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 4, _>((q, v, &self.tau, a,));
+        ::multibody::runtime::kernel::call_exact::<Self, 4, false, _>((q, v, &self.tau, a,));
     }
 
     #[inline(always)]

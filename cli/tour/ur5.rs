@@ -1226,7 +1226,7 @@ impl Ur5 {
     /// Accelerations: time derivatives `v̇` of the velocities.
     /// 342 operations: 149 additions, 188 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 6], v: &[f64; 6], a: &mut [f64; 6]) {
-        ::multibody::runtime::kernel::call_exact::<Self, 4, _>((q, v, &self.tau, a,));
+        ::multibody::runtime::kernel::call_exact::<Self, 4, false, _>((q, v, &self.tau, a,));
     }
 
     #[inline(always)]

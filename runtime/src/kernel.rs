@@ -316,21 +316,24 @@ pub fn call<K: Kernel<ID, 1, X>, const ID: usize, X>(arguments: X) {
     processor::call::<K, ID, 1, X, false>(arguments);
 }
 
-/// Runs a kernel for one state that is so long that registers run short: with AVX-512, which has twice as many, where the
-/// processor has it. Without optimisation, for which debug assertions stand, nothing is gained, and a version less is compiled.
+/// Runs a kernel for one state that is so long that it runs short of registers all the time: with AVX-512, which has twice as
+/// many, where the processor has it. Shorter kernels lose by it on some processors, on which vectors of 64 bytes, which the
+/// compiler uses here and there, slow down what stands beside them. Without optimisation, for which debug assertions stand,
+/// nothing is gained, and a version less is compiled.
 #[inline(always)]
 pub fn call_long<K: Kernel<ID, 1, X>, const ID: usize, X>(arguments: X) {
     processor::call::<K, ID, 1, X, { !cfg!(debug_assertions) }>(arguments);
 }
 
-/// Runs a long kernel of exact arithmetic for one state, whose body is in [`Plain`] arithmetic whatever it is called with:
-/// the same bits with the instructions of every level. With debug assertions, only the version of the target is compiled.
+/// Runs a kernel of exact arithmetic for one state, whose body is in [`Plain`] arithmetic whatever it is called with: the same
+/// bits with the instructions of every level, those of AVX-512 as in [`call_long`] if it is `LONG`. With debug assertions, only
+/// the version of the target is compiled.
 #[inline(always)]
-pub fn call_exact<K: Kernel<ID, 1, X>, const ID: usize, X>(arguments: X) {
+pub fn call_exact<K: Kernel<ID, 1, X>, const ID: usize, const LONG: bool, X>(arguments: X) {
     #[cfg(debug_assertions)]
     K::run::<Plain>(arguments);
     #[cfg(not(debug_assertions))]
-    processor::call::<K, ID, 1, X, true>(arguments);
+    processor::call::<K, ID, 1, X, LONG>(arguments);
 }
 
 /// Runs a kernel for `L` states of numbers of type `T`.

@@ -58,12 +58,13 @@ impl Kernel<0, 1, (&[f64; 3], &mut [f64; 2])> for Twice {
 fn long_kernels_have_the_bits_of_others() {
     let small = f64::powi(2.0, -30);
     let numbers = [1.0 + small, 1.0 - small, -1.0];
-    let [mut short, mut long, mut wide, mut exact] = [[f64::NAN; 2]; 4];
+    let [mut short, mut long, mut wide, mut exact, mut exact_long] = [[f64::NAN; 2]; 5];
     call::<Twice, 0, _>((&numbers, &mut short));
     call_long::<Twice, 0, _>((&numbers, &mut long));
     processor::call::<Twice, 0, 1, _, true>((&numbers, &mut wide));
-    call_exact::<Twice, 0, _>((&numbers, &mut exact));
+    call_exact::<Twice, 0, false, _>((&numbers, &mut exact));
+    call_exact::<Twice, 0, true, _>((&numbers, &mut exact_long));
     let fused = if level() == Level::Plain { 0.0 } else { -small * small };
     assert_eq!([short, long, wide], [[fused, 0.0]; 3]);
-    assert_eq!(exact[1], 0.0);
+    assert_eq!([exact[1], exact_long[1]], [0.0; 2]);
 }
