@@ -539,7 +539,7 @@ impl Chain100 {
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 22323 operations: 10615 additions, 11609 multiplications, 99 divisions; apart: 0 square roots, 100 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 100], p: &[f64; 100], qd: &mut [f64; 100], pd: &mut [f64; 100]) {
-        Self::rates_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &self.tau, qd, pd);
+        ::multibody::runtime::kernel::call_exact::<Self, 0, _>((q, p, &self.tau, qd, pd,));
     }
 
     #[inline(always)]
@@ -1632,7 +1632,7 @@ impl Chain100 {
     /// Velocities from momenta.
     /// 16499 operations: 7655 additions, 8745 multiplications, 99 divisions; apart: 0 square roots, 99 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 100], p: &[f64; 100], v: &mut [f64; 100]) {
-        Self::velocities_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, v);
+        ::multibody::runtime::kernel::call_exact::<Self, 1, _>((q, p, v,));
     }
 
     #[inline(always)]
@@ -2399,7 +2399,7 @@ impl Chain100 {
     /// Momenta from velocities: `p = M(q) v`.
     /// 4445 operations: 1874 additions, 2571 multiplications, 0 divisions; apart: 0 square roots, 99 sine-cosine pairs.
     pub fn momenta(&self, q: &[f64; 100], v: &[f64; 100], p: &mut [f64; 100]) {
-        Self::momenta_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, p);
+        ::multibody::runtime::kernel::call_exact::<Self, 2, _>((q, v, p,));
     }
 
     #[inline(always)]
@@ -2806,7 +2806,7 @@ impl Chain100 {
     /// 17390 operations: 8050 additions, 9241 multiplications, 99 divisions; apart: 0 square roots, 100 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 100], p: &[f64; 100]) -> [f64; 2] {
         let mut energy = [0.0; 2];
-        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut energy);
+        ::multibody::runtime::kernel::call_exact::<Self, 3, _>((q, p, &mut energy,));
         energy
     }
 
@@ -3661,360 +3661,558 @@ impl Chain100 {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 100]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = v.get(6, l); }
-        for l in 0..LANES { given[7][l] = v.get(7, l); }
-        for l in 0..LANES { given[8][l] = v.get(8, l); }
-        for l in 0..LANES { given[9][l] = v.get(9, l); }
-        for l in 0..LANES { given[10][l] = v.get(10, l); }
-        for l in 0..LANES { given[11][l] = v.get(11, l); }
-        for l in 0..LANES { given[12][l] = v.get(12, l); }
-        for l in 0..LANES { given[13][l] = v.get(13, l); }
-        for l in 0..LANES { given[14][l] = v.get(14, l); }
-        for l in 0..LANES { given[15][l] = v.get(15, l); }
-        for l in 0..LANES { given[16][l] = v.get(16, l); }
-        for l in 0..LANES { given[17][l] = v.get(17, l); }
-        for l in 0..LANES { given[18][l] = v.get(18, l); }
-        for l in 0..LANES { given[19][l] = v.get(19, l); }
-        for l in 0..LANES { given[20][l] = v.get(20, l); }
-        for l in 0..LANES { given[21][l] = v.get(21, l); }
-        for l in 0..LANES { given[22][l] = v.get(22, l); }
-        for l in 0..LANES { given[23][l] = v.get(23, l); }
-        for l in 0..LANES { given[24][l] = v.get(24, l); }
-        for l in 0..LANES { given[25][l] = v.get(25, l); }
-        for l in 0..LANES { given[26][l] = v.get(26, l); }
-        for l in 0..LANES { given[27][l] = v.get(27, l); }
-        for l in 0..LANES { given[28][l] = v.get(28, l); }
-        for l in 0..LANES { given[29][l] = v.get(29, l); }
-        for l in 0..LANES { given[30][l] = v.get(30, l); }
-        for l in 0..LANES { given[31][l] = v.get(31, l); }
-        for l in 0..LANES { given[32][l] = v.get(32, l); }
-        for l in 0..LANES { given[33][l] = v.get(33, l); }
-        for l in 0..LANES { given[34][l] = v.get(34, l); }
-        for l in 0..LANES { given[35][l] = v.get(35, l); }
-        for l in 0..LANES { given[36][l] = v.get(36, l); }
-        for l in 0..LANES { given[37][l] = v.get(37, l); }
-        for l in 0..LANES { given[38][l] = v.get(38, l); }
-        for l in 0..LANES { given[39][l] = v.get(39, l); }
-        for l in 0..LANES { given[40][l] = v.get(40, l); }
-        for l in 0..LANES { given[41][l] = v.get(41, l); }
-        for l in 0..LANES { given[42][l] = v.get(42, l); }
-        for l in 0..LANES { given[43][l] = v.get(43, l); }
-        for l in 0..LANES { given[44][l] = v.get(44, l); }
-        for l in 0..LANES { given[45][l] = v.get(45, l); }
-        for l in 0..LANES { given[46][l] = v.get(46, l); }
-        for l in 0..LANES { given[47][l] = v.get(47, l); }
-        for l in 0..LANES { given[48][l] = v.get(48, l); }
-        for l in 0..LANES { given[49][l] = v.get(49, l); }
-        for l in 0..LANES { given[50][l] = v.get(50, l); }
-        for l in 0..LANES { given[51][l] = v.get(51, l); }
-        for l in 0..LANES { given[52][l] = v.get(52, l); }
-        for l in 0..LANES { given[53][l] = v.get(53, l); }
-        for l in 0..LANES { given[54][l] = v.get(54, l); }
-        for l in 0..LANES { given[55][l] = v.get(55, l); }
-        for l in 0..LANES { given[56][l] = v.get(56, l); }
-        for l in 0..LANES { given[57][l] = v.get(57, l); }
-        for l in 0..LANES { given[58][l] = v.get(58, l); }
-        for l in 0..LANES { given[59][l] = v.get(59, l); }
-        for l in 0..LANES { given[60][l] = v.get(60, l); }
-        for l in 0..LANES { given[61][l] = v.get(61, l); }
-        for l in 0..LANES { given[62][l] = v.get(62, l); }
-        for l in 0..LANES { given[63][l] = v.get(63, l); }
-        for l in 0..LANES { given[64][l] = v.get(64, l); }
-        for l in 0..LANES { given[65][l] = v.get(65, l); }
-        for l in 0..LANES { given[66][l] = v.get(66, l); }
-        for l in 0..LANES { given[67][l] = v.get(67, l); }
-        for l in 0..LANES { given[68][l] = v.get(68, l); }
-        for l in 0..LANES { given[69][l] = v.get(69, l); }
-        for l in 0..LANES { given[70][l] = v.get(70, l); }
-        for l in 0..LANES { given[71][l] = v.get(71, l); }
-        for l in 0..LANES { given[72][l] = v.get(72, l); }
-        for l in 0..LANES { given[73][l] = v.get(73, l); }
-        for l in 0..LANES { given[74][l] = v.get(74, l); }
-        for l in 0..LANES { given[75][l] = v.get(75, l); }
-        for l in 0..LANES { given[76][l] = v.get(76, l); }
-        for l in 0..LANES { given[77][l] = v.get(77, l); }
-        for l in 0..LANES { given[78][l] = v.get(78, l); }
-        for l in 0..LANES { given[79][l] = v.get(79, l); }
-        for l in 0..LANES { given[80][l] = v.get(80, l); }
-        for l in 0..LANES { given[81][l] = v.get(81, l); }
-        for l in 0..LANES { given[82][l] = v.get(82, l); }
-        for l in 0..LANES { given[83][l] = v.get(83, l); }
-        for l in 0..LANES { given[84][l] = v.get(84, l); }
-        for l in 0..LANES { given[85][l] = v.get(85, l); }
-        for l in 0..LANES { given[86][l] = v.get(86, l); }
-        for l in 0..LANES { given[87][l] = v.get(87, l); }
-        for l in 0..LANES { given[88][l] = v.get(88, l); }
-        for l in 0..LANES { given[89][l] = v.get(89, l); }
-        for l in 0..LANES { given[90][l] = v.get(90, l); }
-        for l in 0..LANES { given[91][l] = v.get(91, l); }
-        for l in 0..LANES { given[92][l] = v.get(92, l); }
-        for l in 0..LANES { given[93][l] = v.get(93, l); }
-        for l in 0..LANES { given[94][l] = v.get(94, l); }
-        for l in 0..LANES { given[95][l] = v.get(95, l); }
-        for l in 0..LANES { given[96][l] = v.get(96, l); }
-        for l in 0..LANES { given[97][l] = v.get(97, l); }
-        for l in 0..LANES { given[98][l] = v.get(98, l); }
-        for l in 0..LANES { given[99][l] = v.get(99, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 100]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        let mut given_18 = [0.0; LANES];
+        let mut given_19 = [0.0; LANES];
+        let mut given_20 = [0.0; LANES];
+        let mut given_21 = [0.0; LANES];
+        let mut given_22 = [0.0; LANES];
+        let mut given_23 = [0.0; LANES];
+        let mut given_24 = [0.0; LANES];
+        let mut given_25 = [0.0; LANES];
+        let mut given_26 = [0.0; LANES];
+        let mut given_27 = [0.0; LANES];
+        let mut given_28 = [0.0; LANES];
+        let mut given_29 = [0.0; LANES];
+        let mut given_30 = [0.0; LANES];
+        let mut given_31 = [0.0; LANES];
+        let mut given_32 = [0.0; LANES];
+        let mut given_33 = [0.0; LANES];
+        let mut given_34 = [0.0; LANES];
+        let mut given_35 = [0.0; LANES];
+        let mut given_36 = [0.0; LANES];
+        let mut given_37 = [0.0; LANES];
+        let mut given_38 = [0.0; LANES];
+        let mut given_39 = [0.0; LANES];
+        let mut given_40 = [0.0; LANES];
+        let mut given_41 = [0.0; LANES];
+        let mut given_42 = [0.0; LANES];
+        let mut given_43 = [0.0; LANES];
+        let mut given_44 = [0.0; LANES];
+        let mut given_45 = [0.0; LANES];
+        let mut given_46 = [0.0; LANES];
+        let mut given_47 = [0.0; LANES];
+        let mut given_48 = [0.0; LANES];
+        let mut given_49 = [0.0; LANES];
+        let mut given_50 = [0.0; LANES];
+        let mut given_51 = [0.0; LANES];
+        let mut given_52 = [0.0; LANES];
+        let mut given_53 = [0.0; LANES];
+        let mut given_54 = [0.0; LANES];
+        let mut given_55 = [0.0; LANES];
+        let mut given_56 = [0.0; LANES];
+        let mut given_57 = [0.0; LANES];
+        let mut given_58 = [0.0; LANES];
+        let mut given_59 = [0.0; LANES];
+        let mut given_60 = [0.0; LANES];
+        let mut given_61 = [0.0; LANES];
+        let mut given_62 = [0.0; LANES];
+        let mut given_63 = [0.0; LANES];
+        let mut given_64 = [0.0; LANES];
+        let mut given_65 = [0.0; LANES];
+        let mut given_66 = [0.0; LANES];
+        let mut given_67 = [0.0; LANES];
+        let mut given_68 = [0.0; LANES];
+        let mut given_69 = [0.0; LANES];
+        let mut given_70 = [0.0; LANES];
+        let mut given_71 = [0.0; LANES];
+        let mut given_72 = [0.0; LANES];
+        let mut given_73 = [0.0; LANES];
+        let mut given_74 = [0.0; LANES];
+        let mut given_75 = [0.0; LANES];
+        let mut given_76 = [0.0; LANES];
+        let mut given_77 = [0.0; LANES];
+        let mut given_78 = [0.0; LANES];
+        let mut given_79 = [0.0; LANES];
+        let mut given_80 = [0.0; LANES];
+        let mut given_81 = [0.0; LANES];
+        let mut given_82 = [0.0; LANES];
+        let mut given_83 = [0.0; LANES];
+        let mut given_84 = [0.0; LANES];
+        let mut given_85 = [0.0; LANES];
+        let mut given_86 = [0.0; LANES];
+        let mut given_87 = [0.0; LANES];
+        let mut given_88 = [0.0; LANES];
+        let mut given_89 = [0.0; LANES];
+        let mut given_90 = [0.0; LANES];
+        let mut given_91 = [0.0; LANES];
+        let mut given_92 = [0.0; LANES];
+        let mut given_93 = [0.0; LANES];
+        let mut given_94 = [0.0; LANES];
+        let mut given_95 = [0.0; LANES];
+        let mut given_96 = [0.0; LANES];
+        let mut given_97 = [0.0; LANES];
+        let mut given_98 = [0.0; LANES];
+        let mut given_99 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = v.get(6, l); }
+        for l in 0..LANES { given_7[l] = v.get(7, l); }
+        for l in 0..LANES { given_8[l] = v.get(8, l); }
+        for l in 0..LANES { given_9[l] = v.get(9, l); }
+        for l in 0..LANES { given_10[l] = v.get(10, l); }
+        for l in 0..LANES { given_11[l] = v.get(11, l); }
+        for l in 0..LANES { given_12[l] = v.get(12, l); }
+        for l in 0..LANES { given_13[l] = v.get(13, l); }
+        for l in 0..LANES { given_14[l] = v.get(14, l); }
+        for l in 0..LANES { given_15[l] = v.get(15, l); }
+        for l in 0..LANES { given_16[l] = v.get(16, l); }
+        for l in 0..LANES { given_17[l] = v.get(17, l); }
+        for l in 0..LANES { given_18[l] = v.get(18, l); }
+        for l in 0..LANES { given_19[l] = v.get(19, l); }
+        for l in 0..LANES { given_20[l] = v.get(20, l); }
+        for l in 0..LANES { given_21[l] = v.get(21, l); }
+        for l in 0..LANES { given_22[l] = v.get(22, l); }
+        for l in 0..LANES { given_23[l] = v.get(23, l); }
+        for l in 0..LANES { given_24[l] = v.get(24, l); }
+        for l in 0..LANES { given_25[l] = v.get(25, l); }
+        for l in 0..LANES { given_26[l] = v.get(26, l); }
+        for l in 0..LANES { given_27[l] = v.get(27, l); }
+        for l in 0..LANES { given_28[l] = v.get(28, l); }
+        for l in 0..LANES { given_29[l] = v.get(29, l); }
+        for l in 0..LANES { given_30[l] = v.get(30, l); }
+        for l in 0..LANES { given_31[l] = v.get(31, l); }
+        for l in 0..LANES { given_32[l] = v.get(32, l); }
+        for l in 0..LANES { given_33[l] = v.get(33, l); }
+        for l in 0..LANES { given_34[l] = v.get(34, l); }
+        for l in 0..LANES { given_35[l] = v.get(35, l); }
+        for l in 0..LANES { given_36[l] = v.get(36, l); }
+        for l in 0..LANES { given_37[l] = v.get(37, l); }
+        for l in 0..LANES { given_38[l] = v.get(38, l); }
+        for l in 0..LANES { given_39[l] = v.get(39, l); }
+        for l in 0..LANES { given_40[l] = v.get(40, l); }
+        for l in 0..LANES { given_41[l] = v.get(41, l); }
+        for l in 0..LANES { given_42[l] = v.get(42, l); }
+        for l in 0..LANES { given_43[l] = v.get(43, l); }
+        for l in 0..LANES { given_44[l] = v.get(44, l); }
+        for l in 0..LANES { given_45[l] = v.get(45, l); }
+        for l in 0..LANES { given_46[l] = v.get(46, l); }
+        for l in 0..LANES { given_47[l] = v.get(47, l); }
+        for l in 0..LANES { given_48[l] = v.get(48, l); }
+        for l in 0..LANES { given_49[l] = v.get(49, l); }
+        for l in 0..LANES { given_50[l] = v.get(50, l); }
+        for l in 0..LANES { given_51[l] = v.get(51, l); }
+        for l in 0..LANES { given_52[l] = v.get(52, l); }
+        for l in 0..LANES { given_53[l] = v.get(53, l); }
+        for l in 0..LANES { given_54[l] = v.get(54, l); }
+        for l in 0..LANES { given_55[l] = v.get(55, l); }
+        for l in 0..LANES { given_56[l] = v.get(56, l); }
+        for l in 0..LANES { given_57[l] = v.get(57, l); }
+        for l in 0..LANES { given_58[l] = v.get(58, l); }
+        for l in 0..LANES { given_59[l] = v.get(59, l); }
+        for l in 0..LANES { given_60[l] = v.get(60, l); }
+        for l in 0..LANES { given_61[l] = v.get(61, l); }
+        for l in 0..LANES { given_62[l] = v.get(62, l); }
+        for l in 0..LANES { given_63[l] = v.get(63, l); }
+        for l in 0..LANES { given_64[l] = v.get(64, l); }
+        for l in 0..LANES { given_65[l] = v.get(65, l); }
+        for l in 0..LANES { given_66[l] = v.get(66, l); }
+        for l in 0..LANES { given_67[l] = v.get(67, l); }
+        for l in 0..LANES { given_68[l] = v.get(68, l); }
+        for l in 0..LANES { given_69[l] = v.get(69, l); }
+        for l in 0..LANES { given_70[l] = v.get(70, l); }
+        for l in 0..LANES { given_71[l] = v.get(71, l); }
+        for l in 0..LANES { given_72[l] = v.get(72, l); }
+        for l in 0..LANES { given_73[l] = v.get(73, l); }
+        for l in 0..LANES { given_74[l] = v.get(74, l); }
+        for l in 0..LANES { given_75[l] = v.get(75, l); }
+        for l in 0..LANES { given_76[l] = v.get(76, l); }
+        for l in 0..LANES { given_77[l] = v.get(77, l); }
+        for l in 0..LANES { given_78[l] = v.get(78, l); }
+        for l in 0..LANES { given_79[l] = v.get(79, l); }
+        for l in 0..LANES { given_80[l] = v.get(80, l); }
+        for l in 0..LANES { given_81[l] = v.get(81, l); }
+        for l in 0..LANES { given_82[l] = v.get(82, l); }
+        for l in 0..LANES { given_83[l] = v.get(83, l); }
+        for l in 0..LANES { given_84[l] = v.get(84, l); }
+        for l in 0..LANES { given_85[l] = v.get(85, l); }
+        for l in 0..LANES { given_86[l] = v.get(86, l); }
+        for l in 0..LANES { given_87[l] = v.get(87, l); }
+        for l in 0..LANES { given_88[l] = v.get(88, l); }
+        for l in 0..LANES { given_89[l] = v.get(89, l); }
+        for l in 0..LANES { given_90[l] = v.get(90, l); }
+        for l in 0..LANES { given_91[l] = v.get(91, l); }
+        for l in 0..LANES { given_92[l] = v.get(92, l); }
+        for l in 0..LANES { given_93[l] = v.get(93, l); }
+        for l in 0..LANES { given_94[l] = v.get(94, l); }
+        for l in 0..LANES { given_95[l] = v.get(95, l); }
+        for l in 0..LANES { given_96[l] = v.get(96, l); }
+        for l in 0..LANES { given_97[l] = v.get(97, l); }
+        for l in 0..LANES { given_98[l] = v.get(98, l); }
+        for l in 0..LANES { given_99[l] = v.get(99, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
+        let mut result_18 = [0.0; LANES];
+        let mut result_19 = [0.0; LANES];
+        let mut result_20 = [0.0; LANES];
+        let mut result_21 = [0.0; LANES];
+        let mut result_22 = [0.0; LANES];
+        let mut result_23 = [0.0; LANES];
+        let mut result_24 = [0.0; LANES];
+        let mut result_25 = [0.0; LANES];
+        let mut result_26 = [0.0; LANES];
+        let mut result_27 = [0.0; LANES];
+        let mut result_28 = [0.0; LANES];
+        let mut result_29 = [0.0; LANES];
+        let mut result_30 = [0.0; LANES];
+        let mut result_31 = [0.0; LANES];
+        let mut result_32 = [0.0; LANES];
+        let mut result_33 = [0.0; LANES];
+        let mut result_34 = [0.0; LANES];
+        let mut result_35 = [0.0; LANES];
+        let mut result_36 = [0.0; LANES];
+        let mut result_37 = [0.0; LANES];
+        let mut result_38 = [0.0; LANES];
+        let mut result_39 = [0.0; LANES];
+        let mut result_40 = [0.0; LANES];
+        let mut result_41 = [0.0; LANES];
+        let mut result_42 = [0.0; LANES];
+        let mut result_43 = [0.0; LANES];
+        let mut result_44 = [0.0; LANES];
+        let mut result_45 = [0.0; LANES];
+        let mut result_46 = [0.0; LANES];
+        let mut result_47 = [0.0; LANES];
+        let mut result_48 = [0.0; LANES];
+        let mut result_49 = [0.0; LANES];
+        let mut result_50 = [0.0; LANES];
+        let mut result_51 = [0.0; LANES];
+        let mut result_52 = [0.0; LANES];
+        let mut result_53 = [0.0; LANES];
+        let mut result_54 = [0.0; LANES];
+        let mut result_55 = [0.0; LANES];
+        let mut result_56 = [0.0; LANES];
+        let mut result_57 = [0.0; LANES];
+        let mut result_58 = [0.0; LANES];
+        let mut result_59 = [0.0; LANES];
+        let mut result_60 = [0.0; LANES];
+        let mut result_61 = [0.0; LANES];
+        let mut result_62 = [0.0; LANES];
+        let mut result_63 = [0.0; LANES];
+        let mut result_64 = [0.0; LANES];
+        let mut result_65 = [0.0; LANES];
+        let mut result_66 = [0.0; LANES];
+        let mut result_67 = [0.0; LANES];
+        let mut result_68 = [0.0; LANES];
+        let mut result_69 = [0.0; LANES];
+        let mut result_70 = [0.0; LANES];
+        let mut result_71 = [0.0; LANES];
+        let mut result_72 = [0.0; LANES];
+        let mut result_73 = [0.0; LANES];
+        let mut result_74 = [0.0; LANES];
+        let mut result_75 = [0.0; LANES];
+        let mut result_76 = [0.0; LANES];
+        let mut result_77 = [0.0; LANES];
+        let mut result_78 = [0.0; LANES];
+        let mut result_79 = [0.0; LANES];
+        let mut result_80 = [0.0; LANES];
+        let mut result_81 = [0.0; LANES];
+        let mut result_82 = [0.0; LANES];
+        let mut result_83 = [0.0; LANES];
+        let mut result_84 = [0.0; LANES];
+        let mut result_85 = [0.0; LANES];
+        let mut result_86 = [0.0; LANES];
+        let mut result_87 = [0.0; LANES];
+        let mut result_88 = [0.0; LANES];
+        let mut result_89 = [0.0; LANES];
+        let mut result_90 = [0.0; LANES];
+        let mut result_91 = [0.0; LANES];
+        let mut result_92 = [0.0; LANES];
+        let mut result_93 = [0.0; LANES];
+        let mut result_94 = [0.0; LANES];
+        let mut result_95 = [0.0; LANES];
+        let mut result_96 = [0.0; LANES];
+        let mut result_97 = [0.0; LANES];
+        let mut result_98 = [0.0; LANES];
+        let mut result_99 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let v_6 = given[6][l];
-            let v_7 = given[7][l];
-            let v_8 = given[8][l];
-            let v_9 = given[9][l];
-            let v_10 = given[10][l];
-            let v_11 = given[11][l];
-            let v_12 = given[12][l];
-            let v_13 = given[13][l];
-            let v_14 = given[14][l];
-            let v_15 = given[15][l];
-            let v_16 = given[16][l];
-            let v_17 = given[17][l];
-            let v_18 = given[18][l];
-            let v_19 = given[19][l];
-            let v_20 = given[20][l];
-            let v_21 = given[21][l];
-            let v_22 = given[22][l];
-            let v_23 = given[23][l];
-            let v_24 = given[24][l];
-            let v_25 = given[25][l];
-            let v_26 = given[26][l];
-            let v_27 = given[27][l];
-            let v_28 = given[28][l];
-            let v_29 = given[29][l];
-            let v_30 = given[30][l];
-            let v_31 = given[31][l];
-            let v_32 = given[32][l];
-            let v_33 = given[33][l];
-            let v_34 = given[34][l];
-            let v_35 = given[35][l];
-            let v_36 = given[36][l];
-            let v_37 = given[37][l];
-            let v_38 = given[38][l];
-            let v_39 = given[39][l];
-            let v_40 = given[40][l];
-            let v_41 = given[41][l];
-            let v_42 = given[42][l];
-            let v_43 = given[43][l];
-            let v_44 = given[44][l];
-            let v_45 = given[45][l];
-            let v_46 = given[46][l];
-            let v_47 = given[47][l];
-            let v_48 = given[48][l];
-            let v_49 = given[49][l];
-            let v_50 = given[50][l];
-            let v_51 = given[51][l];
-            let v_52 = given[52][l];
-            let v_53 = given[53][l];
-            let v_54 = given[54][l];
-            let v_55 = given[55][l];
-            let v_56 = given[56][l];
-            let v_57 = given[57][l];
-            let v_58 = given[58][l];
-            let v_59 = given[59][l];
-            let v_60 = given[60][l];
-            let v_61 = given[61][l];
-            let v_62 = given[62][l];
-            let v_63 = given[63][l];
-            let v_64 = given[64][l];
-            let v_65 = given[65][l];
-            let v_66 = given[66][l];
-            let v_67 = given[67][l];
-            let v_68 = given[68][l];
-            let v_69 = given[69][l];
-            let v_70 = given[70][l];
-            let v_71 = given[71][l];
-            let v_72 = given[72][l];
-            let v_73 = given[73][l];
-            let v_74 = given[74][l];
-            let v_75 = given[75][l];
-            let v_76 = given[76][l];
-            let v_77 = given[77][l];
-            let v_78 = given[78][l];
-            let v_79 = given[79][l];
-            let v_80 = given[80][l];
-            let v_81 = given[81][l];
-            let v_82 = given[82][l];
-            let v_83 = given[83][l];
-            let v_84 = given[84][l];
-            let v_85 = given[85][l];
-            let v_86 = given[86][l];
-            let v_87 = given[87][l];
-            let v_88 = given[88][l];
-            let v_89 = given[89][l];
-            let v_90 = given[90][l];
-            let v_91 = given[91][l];
-            let v_92 = given[92][l];
-            let v_93 = given[93][l];
-            let v_94 = given[94][l];
-            let v_95 = given[95][l];
-            let v_96 = given[96][l];
-            let v_97 = given[97][l];
-            let v_98 = given[98][l];
-            let v_99 = given[99][l];
-            results[0][l] = v_0;
-            results[1][l] = v_1;
-            results[2][l] = v_2;
-            results[3][l] = v_3;
-            results[4][l] = v_4;
-            results[5][l] = v_5;
-            results[6][l] = v_6;
-            results[7][l] = v_7;
-            results[8][l] = v_8;
-            results[9][l] = v_9;
-            results[10][l] = v_10;
-            results[11][l] = v_11;
-            results[12][l] = v_12;
-            results[13][l] = v_13;
-            results[14][l] = v_14;
-            results[15][l] = v_15;
-            results[16][l] = v_16;
-            results[17][l] = v_17;
-            results[18][l] = v_18;
-            results[19][l] = v_19;
-            results[20][l] = v_20;
-            results[21][l] = v_21;
-            results[22][l] = v_22;
-            results[23][l] = v_23;
-            results[24][l] = v_24;
-            results[25][l] = v_25;
-            results[26][l] = v_26;
-            results[27][l] = v_27;
-            results[28][l] = v_28;
-            results[29][l] = v_29;
-            results[30][l] = v_30;
-            results[31][l] = v_31;
-            results[32][l] = v_32;
-            results[33][l] = v_33;
-            results[34][l] = v_34;
-            results[35][l] = v_35;
-            results[36][l] = v_36;
-            results[37][l] = v_37;
-            results[38][l] = v_38;
-            results[39][l] = v_39;
-            results[40][l] = v_40;
-            results[41][l] = v_41;
-            results[42][l] = v_42;
-            results[43][l] = v_43;
-            results[44][l] = v_44;
-            results[45][l] = v_45;
-            results[46][l] = v_46;
-            results[47][l] = v_47;
-            results[48][l] = v_48;
-            results[49][l] = v_49;
-            results[50][l] = v_50;
-            results[51][l] = v_51;
-            results[52][l] = v_52;
-            results[53][l] = v_53;
-            results[54][l] = v_54;
-            results[55][l] = v_55;
-            results[56][l] = v_56;
-            results[57][l] = v_57;
-            results[58][l] = v_58;
-            results[59][l] = v_59;
-            results[60][l] = v_60;
-            results[61][l] = v_61;
-            results[62][l] = v_62;
-            results[63][l] = v_63;
-            results[64][l] = v_64;
-            results[65][l] = v_65;
-            results[66][l] = v_66;
-            results[67][l] = v_67;
-            results[68][l] = v_68;
-            results[69][l] = v_69;
-            results[70][l] = v_70;
-            results[71][l] = v_71;
-            results[72][l] = v_72;
-            results[73][l] = v_73;
-            results[74][l] = v_74;
-            results[75][l] = v_75;
-            results[76][l] = v_76;
-            results[77][l] = v_77;
-            results[78][l] = v_78;
-            results[79][l] = v_79;
-            results[80][l] = v_80;
-            results[81][l] = v_81;
-            results[82][l] = v_82;
-            results[83][l] = v_83;
-            results[84][l] = v_84;
-            results[85][l] = v_85;
-            results[86][l] = v_86;
-            results[87][l] = v_87;
-            results[88][l] = v_88;
-            results[89][l] = v_89;
-            results[90][l] = v_90;
-            results[91][l] = v_91;
-            results[92][l] = v_92;
-            results[93][l] = v_93;
-            results[94][l] = v_94;
-            results[95][l] = v_95;
-            results[96][l] = v_96;
-            results[97][l] = v_97;
-            results[98][l] = v_98;
-            results[99][l] = v_99;
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let v_6 = given_6[l];
+            let v_7 = given_7[l];
+            let v_8 = given_8[l];
+            let v_9 = given_9[l];
+            let v_10 = given_10[l];
+            let v_11 = given_11[l];
+            let v_12 = given_12[l];
+            let v_13 = given_13[l];
+            let v_14 = given_14[l];
+            let v_15 = given_15[l];
+            let v_16 = given_16[l];
+            let v_17 = given_17[l];
+            let v_18 = given_18[l];
+            let v_19 = given_19[l];
+            let v_20 = given_20[l];
+            let v_21 = given_21[l];
+            let v_22 = given_22[l];
+            let v_23 = given_23[l];
+            let v_24 = given_24[l];
+            let v_25 = given_25[l];
+            let v_26 = given_26[l];
+            let v_27 = given_27[l];
+            let v_28 = given_28[l];
+            let v_29 = given_29[l];
+            let v_30 = given_30[l];
+            let v_31 = given_31[l];
+            let v_32 = given_32[l];
+            let v_33 = given_33[l];
+            let v_34 = given_34[l];
+            let v_35 = given_35[l];
+            let v_36 = given_36[l];
+            let v_37 = given_37[l];
+            let v_38 = given_38[l];
+            let v_39 = given_39[l];
+            let v_40 = given_40[l];
+            let v_41 = given_41[l];
+            let v_42 = given_42[l];
+            let v_43 = given_43[l];
+            let v_44 = given_44[l];
+            let v_45 = given_45[l];
+            let v_46 = given_46[l];
+            let v_47 = given_47[l];
+            let v_48 = given_48[l];
+            let v_49 = given_49[l];
+            let v_50 = given_50[l];
+            let v_51 = given_51[l];
+            let v_52 = given_52[l];
+            let v_53 = given_53[l];
+            let v_54 = given_54[l];
+            let v_55 = given_55[l];
+            let v_56 = given_56[l];
+            let v_57 = given_57[l];
+            let v_58 = given_58[l];
+            let v_59 = given_59[l];
+            let v_60 = given_60[l];
+            let v_61 = given_61[l];
+            let v_62 = given_62[l];
+            let v_63 = given_63[l];
+            let v_64 = given_64[l];
+            let v_65 = given_65[l];
+            let v_66 = given_66[l];
+            let v_67 = given_67[l];
+            let v_68 = given_68[l];
+            let v_69 = given_69[l];
+            let v_70 = given_70[l];
+            let v_71 = given_71[l];
+            let v_72 = given_72[l];
+            let v_73 = given_73[l];
+            let v_74 = given_74[l];
+            let v_75 = given_75[l];
+            let v_76 = given_76[l];
+            let v_77 = given_77[l];
+            let v_78 = given_78[l];
+            let v_79 = given_79[l];
+            let v_80 = given_80[l];
+            let v_81 = given_81[l];
+            let v_82 = given_82[l];
+            let v_83 = given_83[l];
+            let v_84 = given_84[l];
+            let v_85 = given_85[l];
+            let v_86 = given_86[l];
+            let v_87 = given_87[l];
+            let v_88 = given_88[l];
+            let v_89 = given_89[l];
+            let v_90 = given_90[l];
+            let v_91 = given_91[l];
+            let v_92 = given_92[l];
+            let v_93 = given_93[l];
+            let v_94 = given_94[l];
+            let v_95 = given_95[l];
+            let v_96 = given_96[l];
+            let v_97 = given_97[l];
+            let v_98 = given_98[l];
+            let v_99 = given_99[l];
+            result_0[l] = v_0;
+            result_1[l] = v_1;
+            result_2[l] = v_2;
+            result_3[l] = v_3;
+            result_4[l] = v_4;
+            result_5[l] = v_5;
+            result_6[l] = v_6;
+            result_7[l] = v_7;
+            result_8[l] = v_8;
+            result_9[l] = v_9;
+            result_10[l] = v_10;
+            result_11[l] = v_11;
+            result_12[l] = v_12;
+            result_13[l] = v_13;
+            result_14[l] = v_14;
+            result_15[l] = v_15;
+            result_16[l] = v_16;
+            result_17[l] = v_17;
+            result_18[l] = v_18;
+            result_19[l] = v_19;
+            result_20[l] = v_20;
+            result_21[l] = v_21;
+            result_22[l] = v_22;
+            result_23[l] = v_23;
+            result_24[l] = v_24;
+            result_25[l] = v_25;
+            result_26[l] = v_26;
+            result_27[l] = v_27;
+            result_28[l] = v_28;
+            result_29[l] = v_29;
+            result_30[l] = v_30;
+            result_31[l] = v_31;
+            result_32[l] = v_32;
+            result_33[l] = v_33;
+            result_34[l] = v_34;
+            result_35[l] = v_35;
+            result_36[l] = v_36;
+            result_37[l] = v_37;
+            result_38[l] = v_38;
+            result_39[l] = v_39;
+            result_40[l] = v_40;
+            result_41[l] = v_41;
+            result_42[l] = v_42;
+            result_43[l] = v_43;
+            result_44[l] = v_44;
+            result_45[l] = v_45;
+            result_46[l] = v_46;
+            result_47[l] = v_47;
+            result_48[l] = v_48;
+            result_49[l] = v_49;
+            result_50[l] = v_50;
+            result_51[l] = v_51;
+            result_52[l] = v_52;
+            result_53[l] = v_53;
+            result_54[l] = v_54;
+            result_55[l] = v_55;
+            result_56[l] = v_56;
+            result_57[l] = v_57;
+            result_58[l] = v_58;
+            result_59[l] = v_59;
+            result_60[l] = v_60;
+            result_61[l] = v_61;
+            result_62[l] = v_62;
+            result_63[l] = v_63;
+            result_64[l] = v_64;
+            result_65[l] = v_65;
+            result_66[l] = v_66;
+            result_67[l] = v_67;
+            result_68[l] = v_68;
+            result_69[l] = v_69;
+            result_70[l] = v_70;
+            result_71[l] = v_71;
+            result_72[l] = v_72;
+            result_73[l] = v_73;
+            result_74[l] = v_74;
+            result_75[l] = v_75;
+            result_76[l] = v_76;
+            result_77[l] = v_77;
+            result_78[l] = v_78;
+            result_79[l] = v_79;
+            result_80[l] = v_80;
+            result_81[l] = v_81;
+            result_82[l] = v_82;
+            result_83[l] = v_83;
+            result_84[l] = v_84;
+            result_85[l] = v_85;
+            result_86[l] = v_86;
+            result_87[l] = v_87;
+            result_88[l] = v_88;
+            result_89[l] = v_89;
+            result_90[l] = v_90;
+            result_91[l] = v_91;
+            result_92[l] = v_92;
+            result_93[l] = v_93;
+            result_94[l] = v_94;
+            result_95[l] = v_95;
+            result_96[l] = v_96;
+            result_97[l] = v_97;
+            result_98[l] = v_98;
+            result_99[l] = v_99;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
-        qd.give_pair(6, [&results[6], &results[7]]);
-        qd.give_pair(8, [&results[8], &results[9]]);
-        qd.give_pair(10, [&results[10], &results[11]]);
-        qd.give_pair(12, [&results[12], &results[13]]);
-        qd.give_pair(14, [&results[14], &results[15]]);
-        qd.give_pair(16, [&results[16], &results[17]]);
-        qd.give_pair(18, [&results[18], &results[19]]);
-        qd.give_pair(20, [&results[20], &results[21]]);
-        qd.give_pair(22, [&results[22], &results[23]]);
-        qd.give_pair(24, [&results[24], &results[25]]);
-        qd.give_pair(26, [&results[26], &results[27]]);
-        qd.give_pair(28, [&results[28], &results[29]]);
-        qd.give_pair(30, [&results[30], &results[31]]);
-        qd.give_pair(32, [&results[32], &results[33]]);
-        qd.give_pair(34, [&results[34], &results[35]]);
-        qd.give_pair(36, [&results[36], &results[37]]);
-        qd.give_pair(38, [&results[38], &results[39]]);
-        qd.give_pair(40, [&results[40], &results[41]]);
-        qd.give_pair(42, [&results[42], &results[43]]);
-        qd.give_pair(44, [&results[44], &results[45]]);
-        qd.give_pair(46, [&results[46], &results[47]]);
-        qd.give_pair(48, [&results[48], &results[49]]);
-        qd.give_pair(50, [&results[50], &results[51]]);
-        qd.give_pair(52, [&results[52], &results[53]]);
-        qd.give_pair(54, [&results[54], &results[55]]);
-        qd.give_pair(56, [&results[56], &results[57]]);
-        qd.give_pair(58, [&results[58], &results[59]]);
-        qd.give_pair(60, [&results[60], &results[61]]);
-        qd.give_pair(62, [&results[62], &results[63]]);
-        qd.give_pair(64, [&results[64], &results[65]]);
-        qd.give_pair(66, [&results[66], &results[67]]);
-        qd.give_pair(68, [&results[68], &results[69]]);
-        qd.give_pair(70, [&results[70], &results[71]]);
-        qd.give_pair(72, [&results[72], &results[73]]);
-        qd.give_pair(74, [&results[74], &results[75]]);
-        qd.give_pair(76, [&results[76], &results[77]]);
-        qd.give_pair(78, [&results[78], &results[79]]);
-        qd.give_pair(80, [&results[80], &results[81]]);
-        qd.give_pair(82, [&results[82], &results[83]]);
-        qd.give_pair(84, [&results[84], &results[85]]);
-        qd.give_pair(86, [&results[86], &results[87]]);
-        qd.give_pair(88, [&results[88], &results[89]]);
-        qd.give_pair(90, [&results[90], &results[91]]);
-        qd.give_pair(92, [&results[92], &results[93]]);
-        qd.give_pair(94, [&results[94], &results[95]]);
-        qd.give_pair(96, [&results[96], &results[97]]);
-        qd.give_pair(98, [&results[98], &results[99]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
+        qd.give_pair(6, [&result_6, &result_7]);
+        qd.give_pair(8, [&result_8, &result_9]);
+        qd.give_pair(10, [&result_10, &result_11]);
+        qd.give_pair(12, [&result_12, &result_13]);
+        qd.give_pair(14, [&result_14, &result_15]);
+        qd.give_pair(16, [&result_16, &result_17]);
+        qd.give_pair(18, [&result_18, &result_19]);
+        qd.give_pair(20, [&result_20, &result_21]);
+        qd.give_pair(22, [&result_22, &result_23]);
+        qd.give_pair(24, [&result_24, &result_25]);
+        qd.give_pair(26, [&result_26, &result_27]);
+        qd.give_pair(28, [&result_28, &result_29]);
+        qd.give_pair(30, [&result_30, &result_31]);
+        qd.give_pair(32, [&result_32, &result_33]);
+        qd.give_pair(34, [&result_34, &result_35]);
+        qd.give_pair(36, [&result_36, &result_37]);
+        qd.give_pair(38, [&result_38, &result_39]);
+        qd.give_pair(40, [&result_40, &result_41]);
+        qd.give_pair(42, [&result_42, &result_43]);
+        qd.give_pair(44, [&result_44, &result_45]);
+        qd.give_pair(46, [&result_46, &result_47]);
+        qd.give_pair(48, [&result_48, &result_49]);
+        qd.give_pair(50, [&result_50, &result_51]);
+        qd.give_pair(52, [&result_52, &result_53]);
+        qd.give_pair(54, [&result_54, &result_55]);
+        qd.give_pair(56, [&result_56, &result_57]);
+        qd.give_pair(58, [&result_58, &result_59]);
+        qd.give_pair(60, [&result_60, &result_61]);
+        qd.give_pair(62, [&result_62, &result_63]);
+        qd.give_pair(64, [&result_64, &result_65]);
+        qd.give_pair(66, [&result_66, &result_67]);
+        qd.give_pair(68, [&result_68, &result_69]);
+        qd.give_pair(70, [&result_70, &result_71]);
+        qd.give_pair(72, [&result_72, &result_73]);
+        qd.give_pair(74, [&result_74, &result_75]);
+        qd.give_pair(76, [&result_76, &result_77]);
+        qd.give_pair(78, [&result_78, &result_79]);
+        qd.give_pair(80, [&result_80, &result_81]);
+        qd.give_pair(82, [&result_82, &result_83]);
+        qd.give_pair(84, [&result_84, &result_85]);
+        qd.give_pair(86, [&result_86, &result_87]);
+        qd.give_pair(88, [&result_88, &result_89]);
+        qd.give_pair(90, [&result_90, &result_91]);
+        qd.give_pair(92, [&result_92, &result_93]);
+        qd.give_pair(94, [&result_94, &result_95]);
+        qd.give_pair(96, [&result_96, &result_97]);
+        qd.give_pair(98, [&result_98, &result_99]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

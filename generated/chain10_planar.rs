@@ -93,7 +93,7 @@ impl Chain10Planar {
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 806 operations: 350 additions, 447 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 10], p: &[f64; 10], qd: &mut [f64; 10], pd: &mut [f64; 10]) {
-        Self::rates_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &self.tau, qd, pd);
+        ::multibody::runtime::kernel::call_exact::<Self, 0, _>((q, p, &self.tau, qd, pd,));
     }
 
     #[inline(always)]
@@ -122,49 +122,87 @@ impl Chain10Planar {
             angles[9][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 20]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(4, l); }
-        for l in 0..LANES { given[5][l] = p.get(5, l); }
-        for l in 0..LANES { given[6][l] = p.get(6, l); }
-        for l in 0..LANES { given[7][l] = p.get(7, l); }
-        for l in 0..LANES { given[8][l] = p.get(8, l); }
-        for l in 0..LANES { given[9][l] = p.get(9, l); }
-        for l in 0..LANES { given[10][l] = tau.get(0, l); }
-        for l in 0..LANES { given[11][l] = tau.get(1, l); }
-        for l in 0..LANES { given[12][l] = tau.get(2, l); }
-        for l in 0..LANES { given[13][l] = tau.get(3, l); }
-        for l in 0..LANES { given[14][l] = tau.get(4, l); }
-        for l in 0..LANES { given[15][l] = tau.get(5, l); }
-        for l in 0..LANES { given[16][l] = tau.get(6, l); }
-        for l in 0..LANES { given[17][l] = tau.get(7, l); }
-        for l in 0..LANES { given[18][l] = tau.get(8, l); }
-        for l in 0..LANES { given[19][l] = tau.get(9, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 20]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        let mut given_18 = [0.0; LANES];
+        let mut given_19 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(4, l); }
+        for l in 0..LANES { given_5[l] = p.get(5, l); }
+        for l in 0..LANES { given_6[l] = p.get(6, l); }
+        for l in 0..LANES { given_7[l] = p.get(7, l); }
+        for l in 0..LANES { given_8[l] = p.get(8, l); }
+        for l in 0..LANES { given_9[l] = p.get(9, l); }
+        for l in 0..LANES { given_10[l] = tau.get(0, l); }
+        for l in 0..LANES { given_11[l] = tau.get(1, l); }
+        for l in 0..LANES { given_12[l] = tau.get(2, l); }
+        for l in 0..LANES { given_13[l] = tau.get(3, l); }
+        for l in 0..LANES { given_14[l] = tau.get(4, l); }
+        for l in 0..LANES { given_15[l] = tau.get(5, l); }
+        for l in 0..LANES { given_16[l] = tau.get(6, l); }
+        for l in 0..LANES { given_17[l] = tau.get(7, l); }
+        for l in 0..LANES { given_18[l] = tau.get(8, l); }
+        for l in 0..LANES { given_19[l] = tau.get(9, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
+        let mut result_18 = [0.0; LANES];
+        let mut result_19 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
-            let p_2 = given[2][l];
-            let p_3 = given[3][l];
-            let p_4 = given[4][l];
-            let p_5 = given[5][l];
-            let p_6 = given[6][l];
-            let p_7 = given[7][l];
-            let p_8 = given[8][l];
-            let p_9 = given[9][l];
-            let tau_0 = given[10][l];
-            let tau_1 = given[11][l];
-            let tau_2 = given[12][l];
-            let tau_3 = given[13][l];
-            let tau_4 = given[14][l];
-            let tau_5 = given[15][l];
-            let tau_6 = given[16][l];
-            let tau_7 = given[17][l];
-            let tau_8 = given[18][l];
-            let tau_9 = given[19][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
+            let p_2 = given_2[l];
+            let p_3 = given_3[l];
+            let p_4 = given_4[l];
+            let p_5 = given_5[l];
+            let p_6 = given_6[l];
+            let p_7 = given_7[l];
+            let p_8 = given_8[l];
+            let p_9 = given_9[l];
+            let tau_0 = given_10[l];
+            let tau_1 = given_11[l];
+            let tau_2 = given_12[l];
+            let tau_3 = given_13[l];
+            let tau_4 = given_14[l];
+            let tau_5 = given_15[l];
+            let tau_6 = given_16[l];
+            let tau_7 = given_17[l];
+            let tau_8 = given_18[l];
+            let tau_9 = given_19[l];
             // link1: sine and cosine, rotation
             let link1_sin = sines[0][l];
             let link1_cos = cosines[0][l];
@@ -1056,43 +1094,43 @@ impl Chain10Planar {
             let pd_7 = tau_7 - link8_t50;
             let pd_8 = tau_8 - link9_t34;
             let pd_9 = tau_9 + link10_t14;
-            results[0][l] = -link1_minus_e;
-            results[1][l] = link2_v;
-            results[2][l] = link3_v;
-            results[3][l] = link4_v;
-            results[4][l] = link5_v;
-            results[5][l] = link6_v;
-            results[6][l] = link7_v;
-            results[7][l] = link8_v;
-            results[8][l] = link9_v;
-            results[9][l] = link10_v;
-            results[10][l] = pd_0;
-            results[11][l] = pd_1;
-            results[12][l] = pd_2;
-            results[13][l] = pd_3;
-            results[14][l] = pd_4;
-            results[15][l] = pd_5;
-            results[16][l] = pd_6;
-            results[17][l] = pd_7;
-            results[18][l] = pd_8;
-            results[19][l] = pd_9;
+            result_0[l] = -link1_minus_e;
+            result_1[l] = link2_v;
+            result_2[l] = link3_v;
+            result_3[l] = link4_v;
+            result_4[l] = link5_v;
+            result_5[l] = link6_v;
+            result_6[l] = link7_v;
+            result_7[l] = link8_v;
+            result_8[l] = link9_v;
+            result_9[l] = link10_v;
+            result_10[l] = pd_0;
+            result_11[l] = pd_1;
+            result_12[l] = pd_2;
+            result_13[l] = pd_3;
+            result_14[l] = pd_4;
+            result_15[l] = pd_5;
+            result_16[l] = pd_6;
+            result_17[l] = pd_7;
+            result_18[l] = pd_8;
+            result_19[l] = pd_9;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
-        qd.give_pair(6, [&results[6], &results[7]]);
-        qd.give_pair(8, [&results[8], &results[9]]);
-        pd.give_pair(0, [&results[10], &results[11]]);
-        pd.give_pair(2, [&results[12], &results[13]]);
-        pd.give_pair(4, [&results[14], &results[15]]);
-        pd.give_pair(6, [&results[16], &results[17]]);
-        pd.give_pair(8, [&results[18], &results[19]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
+        qd.give_pair(6, [&result_6, &result_7]);
+        qd.give_pair(8, [&result_8, &result_9]);
+        pd.give_pair(0, [&result_10, &result_11]);
+        pd.give_pair(2, [&result_12, &result_13]);
+        pd.give_pair(4, [&result_14, &result_15]);
+        pd.give_pair(6, [&result_16, &result_17]);
+        pd.give_pair(8, [&result_18, &result_19]);
     }
 
     /// Velocities from momenta.
     /// 548 operations: 238 additions, 301 multiplications, 9 divisions; apart: 0 square roots, 9 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 10], p: &[f64; 10], v: &mut [f64; 10]) {
-        Self::velocities_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, v);
+        ::multibody::runtime::kernel::call_exact::<Self, 1, _>((q, p, v,));
     }
 
     #[inline(always)]
@@ -1119,29 +1157,47 @@ impl Chain10Planar {
             angles[8][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 9>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(4, l); }
-        for l in 0..LANES { given[5][l] = p.get(5, l); }
-        for l in 0..LANES { given[6][l] = p.get(6, l); }
-        for l in 0..LANES { given[7][l] = p.get(7, l); }
-        for l in 0..LANES { given[8][l] = p.get(8, l); }
-        for l in 0..LANES { given[9][l] = p.get(9, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(4, l); }
+        for l in 0..LANES { given_5[l] = p.get(5, l); }
+        for l in 0..LANES { given_6[l] = p.get(6, l); }
+        for l in 0..LANES { given_7[l] = p.get(7, l); }
+        for l in 0..LANES { given_8[l] = p.get(8, l); }
+        for l in 0..LANES { given_9[l] = p.get(9, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
-            let p_2 = given[2][l];
-            let p_3 = given[3][l];
-            let p_4 = given[4][l];
-            let p_5 = given[5][l];
-            let p_6 = given[6][l];
-            let p_7 = given[7][l];
-            let p_8 = given[8][l];
-            let p_9 = given[9][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
+            let p_2 = given_2[l];
+            let p_3 = given_3[l];
+            let p_4 = given_4[l];
+            let p_5 = given_5[l];
+            let p_6 = given_6[l];
+            let p_7 = given_7[l];
+            let p_8 = given_8[l];
+            let p_9 = given_9[l];
             // link2: sine and cosine, rotation
             let link2_sin = sines[0][l];
             let link2_cos = cosines[0][l];
@@ -1748,22 +1804,22 @@ impl Chain10Planar {
             let link6_t225 = link6_t223 - link6_t224;
             let link6_t226 = link6_t50 * link7_v;
             let link10_v = link6_t225 - link6_t226;
-            results[0][l] = -link1_minus_e;
-            results[1][l] = link2_v;
-            results[2][l] = link3_v;
-            results[3][l] = link4_v;
-            results[4][l] = link5_v;
-            results[5][l] = link6_v;
-            results[6][l] = link7_v;
-            results[7][l] = link8_v;
-            results[8][l] = link9_v;
-            results[9][l] = link10_v;
+            result_0[l] = -link1_minus_e;
+            result_1[l] = link2_v;
+            result_2[l] = link3_v;
+            result_3[l] = link4_v;
+            result_4[l] = link5_v;
+            result_5[l] = link6_v;
+            result_6[l] = link7_v;
+            result_7[l] = link8_v;
+            result_8[l] = link9_v;
+            result_9[l] = link10_v;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        v.give_pair(2, [&results[2], &results[3]]);
-        v.give_pair(4, [&results[4], &results[5]]);
-        v.give_pair(6, [&results[6], &results[7]]);
-        v.give_pair(8, [&results[8], &results[9]]);
+        v.give_pair(0, [&result_0, &result_1]);
+        v.give_pair(2, [&result_2, &result_3]);
+        v.give_pair(4, [&result_4, &result_5]);
+        v.give_pair(6, [&result_6, &result_7]);
+        v.give_pair(8, [&result_8, &result_9]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -1797,29 +1853,47 @@ impl Chain10Planar {
             angles[8][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 9>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = v.get(6, l); }
-        for l in 0..LANES { given[7][l] = v.get(7, l); }
-        for l in 0..LANES { given[8][l] = v.get(8, l); }
-        for l in 0..LANES { given[9][l] = v.get(9, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = v.get(6, l); }
+        for l in 0..LANES { given_7[l] = v.get(7, l); }
+        for l in 0..LANES { given_8[l] = v.get(8, l); }
+        for l in 0..LANES { given_9[l] = v.get(9, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let v_6 = given[6][l];
-            let v_7 = given[7][l];
-            let v_8 = given[8][l];
-            let v_9 = given[9][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let v_6 = given_6[l];
+            let v_7 = given_7[l];
+            let v_8 = given_8[l];
+            let v_9 = given_9[l];
             // link2: sine and cosine, rotation
             let link2_sin = sines[0][l];
             let link2_cos = cosines[0][l];
@@ -2065,29 +2139,29 @@ impl Chain10Planar {
             let link2_t8 = 0.25 * link2_t7;
             let link2_t9 = link2_p_rz - link2_t8;
             let link1_p_rz = link1_t0 + link2_t9;
-            results[0][l] = link1_p_rz;
-            results[1][l] = link2_p_rz;
-            results[2][l] = link3_p_rz;
-            results[3][l] = link4_p_rz;
-            results[4][l] = link5_p_rz;
-            results[5][l] = link6_p_rz;
-            results[6][l] = link7_p_rz;
-            results[7][l] = link8_p_rz;
-            results[8][l] = link9_p_rz;
-            results[9][l] = link10_p_rz;
+            result_0[l] = link1_p_rz;
+            result_1[l] = link2_p_rz;
+            result_2[l] = link3_p_rz;
+            result_3[l] = link4_p_rz;
+            result_4[l] = link5_p_rz;
+            result_5[l] = link6_p_rz;
+            result_6[l] = link7_p_rz;
+            result_7[l] = link8_p_rz;
+            result_8[l] = link9_p_rz;
+            result_9[l] = link10_p_rz;
         }
-        p.give_pair(0, [&results[0], &results[1]]);
-        p.give_pair(2, [&results[2], &results[3]]);
-        p.give_pair(4, [&results[4], &results[5]]);
-        p.give_pair(6, [&results[6], &results[7]]);
-        p.give_pair(8, [&results[8], &results[9]]);
+        p.give_pair(0, [&result_0, &result_1]);
+        p.give_pair(2, [&result_2, &result_3]);
+        p.give_pair(4, [&result_4, &result_5]);
+        p.give_pair(6, [&result_6, &result_7]);
+        p.give_pair(8, [&result_8, &result_9]);
     }
 
     /// Kinetic and potential energy, J.
     /// 601 operations: 261 additions, 331 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 10], p: &[f64; 10]) -> [f64; 2] {
         let mut energy = [0.0; 2];
-        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut energy);
+        ::multibody::runtime::kernel::call_exact::<Self, 3, _>((q, p, &mut energy,));
         energy
     }
 
@@ -2117,29 +2191,39 @@ impl Chain10Planar {
             angles[9][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(4, l); }
-        for l in 0..LANES { given[5][l] = p.get(5, l); }
-        for l in 0..LANES { given[6][l] = p.get(6, l); }
-        for l in 0..LANES { given[7][l] = p.get(7, l); }
-        for l in 0..LANES { given[8][l] = p.get(8, l); }
-        for l in 0..LANES { given[9][l] = p.get(9, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(4, l); }
+        for l in 0..LANES { given_5[l] = p.get(5, l); }
+        for l in 0..LANES { given_6[l] = p.get(6, l); }
+        for l in 0..LANES { given_7[l] = p.get(7, l); }
+        for l in 0..LANES { given_8[l] = p.get(8, l); }
+        for l in 0..LANES { given_9[l] = p.get(9, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
-            let p_2 = given[2][l];
-            let p_3 = given[3][l];
-            let p_4 = given[4][l];
-            let p_5 = given[5][l];
-            let p_6 = given[6][l];
-            let p_7 = given[7][l];
-            let p_8 = given[8][l];
-            let p_9 = given[9][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
+            let p_2 = given_2[l];
+            let p_3 = given_3[l];
+            let p_4 = given_4[l];
+            let p_5 = given_5[l];
+            let p_6 = given_6[l];
+            let p_7 = given_7[l];
+            let p_8 = given_8[l];
+            let p_9 = given_9[l];
             // link1: sine and cosine, rotation
             let link1_sin = sines[0][l];
             let link1_cos = cosines[0][l];
@@ -2811,16 +2895,16 @@ impl Chain10Planar {
             let minus_energy_0 = 0.5 * link10_t12;
             // ground: energy
             let energy_1 = 9.81 * link1_minus_mp_rx_z;
-            results[0][l] = -minus_energy_0;
-            results[1][l] = energy_1;
+            result_0[l] = -minus_energy_0;
+            result_1[l] = energy_1;
         }
-        energy.give_pair(0, [&results[0], &results[1]]);
+        energy.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
     /// 605 operations: 260 additions, 336 multiplications, 9 divisions; apart: 0 square roots, 10 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 10], v: &[f64; 10], a: &mut [f64; 10]) {
-        Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, a);
+        ::multibody::runtime::kernel::call_exact::<Self, 4, _>((q, v, &self.tau, a,));
     }
 
     #[inline(always)]
@@ -2849,49 +2933,77 @@ impl Chain10Planar {
             angles[9][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 20]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = v.get(6, l); }
-        for l in 0..LANES { given[7][l] = v.get(7, l); }
-        for l in 0..LANES { given[8][l] = v.get(8, l); }
-        for l in 0..LANES { given[9][l] = v.get(9, l); }
-        for l in 0..LANES { given[10][l] = tau.get(0, l); }
-        for l in 0..LANES { given[11][l] = tau.get(1, l); }
-        for l in 0..LANES { given[12][l] = tau.get(2, l); }
-        for l in 0..LANES { given[13][l] = tau.get(3, l); }
-        for l in 0..LANES { given[14][l] = tau.get(4, l); }
-        for l in 0..LANES { given[15][l] = tau.get(5, l); }
-        for l in 0..LANES { given[16][l] = tau.get(6, l); }
-        for l in 0..LANES { given[17][l] = tau.get(7, l); }
-        for l in 0..LANES { given[18][l] = tau.get(8, l); }
-        for l in 0..LANES { given[19][l] = tau.get(9, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        let mut given_18 = [0.0; LANES];
+        let mut given_19 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = v.get(6, l); }
+        for l in 0..LANES { given_7[l] = v.get(7, l); }
+        for l in 0..LANES { given_8[l] = v.get(8, l); }
+        for l in 0..LANES { given_9[l] = v.get(9, l); }
+        for l in 0..LANES { given_10[l] = tau.get(0, l); }
+        for l in 0..LANES { given_11[l] = tau.get(1, l); }
+        for l in 0..LANES { given_12[l] = tau.get(2, l); }
+        for l in 0..LANES { given_13[l] = tau.get(3, l); }
+        for l in 0..LANES { given_14[l] = tau.get(4, l); }
+        for l in 0..LANES { given_15[l] = tau.get(5, l); }
+        for l in 0..LANES { given_16[l] = tau.get(6, l); }
+        for l in 0..LANES { given_17[l] = tau.get(7, l); }
+        for l in 0..LANES { given_18[l] = tau.get(8, l); }
+        for l in 0..LANES { given_19[l] = tau.get(9, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let v_6 = given[6][l];
-            let v_7 = given[7][l];
-            let v_8 = given[8][l];
-            let v_9 = given[9][l];
-            let tau_0 = given[10][l];
-            let tau_1 = given[11][l];
-            let tau_2 = given[12][l];
-            let tau_3 = given[13][l];
-            let tau_4 = given[14][l];
-            let tau_5 = given[15][l];
-            let tau_6 = given[16][l];
-            let tau_7 = given[17][l];
-            let tau_8 = given[18][l];
-            let tau_9 = given[19][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let v_6 = given_6[l];
+            let v_7 = given_7[l];
+            let v_8 = given_8[l];
+            let v_9 = given_9[l];
+            let tau_0 = given_10[l];
+            let tau_1 = given_11[l];
+            let tau_2 = given_12[l];
+            let tau_3 = given_13[l];
+            let tau_4 = given_14[l];
+            let tau_5 = given_15[l];
+            let tau_6 = given_16[l];
+            let tau_7 = given_17[l];
+            let tau_8 = given_18[l];
+            let tau_9 = given_19[l];
             // link1: sine and cosine, rotation
             let link1_sin = sines[0][l];
             let link1_cos = cosines[0][l];
@@ -3588,28 +3700,28 @@ impl Chain10Planar {
             let link8_t103 = link8_t67 - link8_t102;
             let link8_t104 = link8_t32 * link9_a;
             let link10_a = link8_t103 - link8_t104;
-            results[0][l] = -link1_minus_e;
-            results[1][l] = link2_a;
-            results[2][l] = link3_a;
-            results[3][l] = link4_a;
-            results[4][l] = link5_a;
-            results[5][l] = link6_a;
-            results[6][l] = link7_a;
-            results[7][l] = link8_a;
-            results[8][l] = link9_a;
-            results[9][l] = link10_a;
+            result_0[l] = -link1_minus_e;
+            result_1[l] = link2_a;
+            result_2[l] = link3_a;
+            result_3[l] = link4_a;
+            result_4[l] = link5_a;
+            result_5[l] = link6_a;
+            result_6[l] = link7_a;
+            result_7[l] = link8_a;
+            result_8[l] = link9_a;
+            result_9[l] = link10_a;
         }
-        a.give_pair(0, [&results[0], &results[1]]);
-        a.give_pair(2, [&results[2], &results[3]]);
-        a.give_pair(4, [&results[4], &results[5]]);
-        a.give_pair(6, [&results[6], &results[7]]);
-        a.give_pair(8, [&results[8], &results[9]]);
+        a.give_pair(0, [&result_0, &result_1]);
+        a.give_pair(2, [&result_2, &result_3]);
+        a.give_pair(4, [&result_4, &result_5]);
+        a.give_pair(6, [&result_6, &result_7]);
+        a.give_pair(8, [&result_8, &result_9]);
     }
 
     /// Mass matrix, by rows.
     /// 333 operations: 158 additions, 175 multiplications, 0 divisions; apart: 0 square roots, 9 sine-cosine pairs.
     pub fn mass_matrix(&self, q: &[f64; 10], m: &mut [[f64; 10]; 10]) {
-        Self::mass_matrix_kernel::<::multibody::runtime::kernel::Plain, 1>(q, m.as_flattened_mut());
+        ::multibody::runtime::kernel::call_exact::<Self, 5, _>((q, m.as_flattened_mut(),));
     }
 
     #[inline(always)]
@@ -3636,7 +3748,106 @@ impl Chain10Planar {
             angles[8][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 9>(&angles);
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 100]);
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
+        let mut result_18 = [0.0; LANES];
+        let mut result_19 = [0.0; LANES];
+        let mut result_20 = [0.0; LANES];
+        let mut result_21 = [0.0; LANES];
+        let mut result_22 = [0.0; LANES];
+        let mut result_23 = [0.0; LANES];
+        let mut result_24 = [0.0; LANES];
+        let mut result_25 = [0.0; LANES];
+        let mut result_26 = [0.0; LANES];
+        let mut result_27 = [0.0; LANES];
+        let mut result_28 = [0.0; LANES];
+        let mut result_29 = [0.0; LANES];
+        let mut result_30 = [0.0; LANES];
+        let mut result_31 = [0.0; LANES];
+        let mut result_32 = [0.0; LANES];
+        let mut result_33 = [0.0; LANES];
+        let mut result_34 = [0.0; LANES];
+        let mut result_35 = [0.0; LANES];
+        let mut result_36 = [0.0; LANES];
+        let mut result_37 = [0.0; LANES];
+        let mut result_38 = [0.0; LANES];
+        let mut result_39 = [0.0; LANES];
+        let mut result_40 = [0.0; LANES];
+        let mut result_41 = [0.0; LANES];
+        let mut result_42 = [0.0; LANES];
+        let mut result_43 = [0.0; LANES];
+        let mut result_44 = [0.0; LANES];
+        let mut result_45 = [0.0; LANES];
+        let mut result_46 = [0.0; LANES];
+        let mut result_47 = [0.0; LANES];
+        let mut result_48 = [0.0; LANES];
+        let mut result_49 = [0.0; LANES];
+        let mut result_50 = [0.0; LANES];
+        let mut result_51 = [0.0; LANES];
+        let mut result_52 = [0.0; LANES];
+        let mut result_53 = [0.0; LANES];
+        let mut result_54 = [0.0; LANES];
+        let mut result_55 = [0.0; LANES];
+        let mut result_56 = [0.0; LANES];
+        let mut result_57 = [0.0; LANES];
+        let mut result_58 = [0.0; LANES];
+        let mut result_59 = [0.0; LANES];
+        let mut result_60 = [0.0; LANES];
+        let mut result_61 = [0.0; LANES];
+        let mut result_62 = [0.0; LANES];
+        let mut result_63 = [0.0; LANES];
+        let mut result_64 = [0.0; LANES];
+        let mut result_65 = [0.0; LANES];
+        let mut result_66 = [0.0; LANES];
+        let mut result_67 = [0.0; LANES];
+        let mut result_68 = [0.0; LANES];
+        let mut result_69 = [0.0; LANES];
+        let mut result_70 = [0.0; LANES];
+        let mut result_71 = [0.0; LANES];
+        let mut result_72 = [0.0; LANES];
+        let mut result_73 = [0.0; LANES];
+        let mut result_74 = [0.0; LANES];
+        let mut result_75 = [0.0; LANES];
+        let mut result_76 = [0.0; LANES];
+        let mut result_77 = [0.0; LANES];
+        let mut result_78 = [0.0; LANES];
+        let mut result_79 = [0.0; LANES];
+        let mut result_80 = [0.0; LANES];
+        let mut result_81 = [0.0; LANES];
+        let mut result_82 = [0.0; LANES];
+        let mut result_83 = [0.0; LANES];
+        let mut result_84 = [0.0; LANES];
+        let mut result_85 = [0.0; LANES];
+        let mut result_86 = [0.0; LANES];
+        let mut result_87 = [0.0; LANES];
+        let mut result_88 = [0.0; LANES];
+        let mut result_89 = [0.0; LANES];
+        let mut result_90 = [0.0; LANES];
+        let mut result_91 = [0.0; LANES];
+        let mut result_92 = [0.0; LANES];
+        let mut result_93 = [0.0; LANES];
+        let mut result_94 = [0.0; LANES];
+        let mut result_95 = [0.0; LANES];
+        let mut result_96 = [0.0; LANES];
+        let mut result_97 = [0.0; LANES];
+        let mut result_98 = [0.0; LANES];
+        let mut result_99 = [0.0; LANES];
         for l in 0..LANES {
             // link2: sine and cosine, rotation
             let link2_sin = sines[0][l];
@@ -4010,157 +4221,157 @@ impl Chain10Planar {
             let link2_t9 = 0.25 * link2_t8;
             let link2_t10 = m_1_1 - link2_t9;
             let m_0_0 = link2_t10 + 0.23334999999999997;
-            results[0][l] = m_0_0;
-            results[1][l] = m_0_1;
-            results[2][l] = m_0_2;
-            results[3][l] = m_0_3;
-            results[4][l] = m_0_4;
-            results[5][l] = m_0_5;
-            results[6][l] = m_0_6;
-            results[7][l] = m_0_7;
-            results[8][l] = m_0_8;
-            results[9][l] = m_0_9;
-            results[10][l] = m_0_1;
-            results[11][l] = m_1_1;
-            results[12][l] = m_1_2;
-            results[13][l] = m_1_3;
-            results[14][l] = m_1_4;
-            results[15][l] = m_1_5;
-            results[16][l] = m_1_6;
-            results[17][l] = m_1_7;
-            results[18][l] = m_1_8;
-            results[19][l] = m_1_9;
-            results[20][l] = m_0_2;
-            results[21][l] = m_1_2;
-            results[22][l] = m_2_2;
-            results[23][l] = m_2_3;
-            results[24][l] = m_2_4;
-            results[25][l] = m_2_5;
-            results[26][l] = m_2_6;
-            results[27][l] = m_2_7;
-            results[28][l] = m_2_8;
-            results[29][l] = m_2_9;
-            results[30][l] = m_0_3;
-            results[31][l] = m_1_3;
-            results[32][l] = m_2_3;
-            results[33][l] = m_3_3;
-            results[34][l] = m_3_4;
-            results[35][l] = m_3_5;
-            results[36][l] = m_3_6;
-            results[37][l] = m_3_7;
-            results[38][l] = m_3_8;
-            results[39][l] = m_3_9;
-            results[40][l] = m_0_4;
-            results[41][l] = m_1_4;
-            results[42][l] = m_2_4;
-            results[43][l] = m_3_4;
-            results[44][l] = m_4_4;
-            results[45][l] = m_4_5;
-            results[46][l] = m_4_6;
-            results[47][l] = m_4_7;
-            results[48][l] = m_4_8;
-            results[49][l] = m_4_9;
-            results[50][l] = m_0_5;
-            results[51][l] = m_1_5;
-            results[52][l] = m_2_5;
-            results[53][l] = m_3_5;
-            results[54][l] = m_4_5;
-            results[55][l] = m_5_5;
-            results[56][l] = m_5_6;
-            results[57][l] = m_5_7;
-            results[58][l] = m_5_8;
-            results[59][l] = m_5_9;
-            results[60][l] = m_0_6;
-            results[61][l] = m_1_6;
-            results[62][l] = m_2_6;
-            results[63][l] = m_3_6;
-            results[64][l] = m_4_6;
-            results[65][l] = m_5_6;
-            results[66][l] = m_6_6;
-            results[67][l] = m_6_7;
-            results[68][l] = m_6_8;
-            results[69][l] = m_6_9;
-            results[70][l] = m_0_7;
-            results[71][l] = m_1_7;
-            results[72][l] = m_2_7;
-            results[73][l] = m_3_7;
-            results[74][l] = m_4_7;
-            results[75][l] = m_5_7;
-            results[76][l] = m_6_7;
-            results[77][l] = m_7_7;
-            results[78][l] = m_7_8;
-            results[79][l] = m_7_9;
-            results[80][l] = m_0_8;
-            results[81][l] = m_1_8;
-            results[82][l] = m_2_8;
-            results[83][l] = m_3_8;
-            results[84][l] = m_4_8;
-            results[85][l] = m_5_8;
-            results[86][l] = m_6_8;
-            results[87][l] = m_7_8;
-            results[88][l] = m_8_8;
-            results[89][l] = m_8_9;
-            results[90][l] = m_0_9;
-            results[91][l] = m_1_9;
-            results[92][l] = m_2_9;
-            results[93][l] = m_3_9;
-            results[94][l] = m_4_9;
-            results[95][l] = m_5_9;
-            results[96][l] = m_6_9;
-            results[97][l] = m_7_9;
-            results[98][l] = m_8_9;
-            results[99][l] = 0.00835;
+            result_0[l] = m_0_0;
+            result_1[l] = m_0_1;
+            result_2[l] = m_0_2;
+            result_3[l] = m_0_3;
+            result_4[l] = m_0_4;
+            result_5[l] = m_0_5;
+            result_6[l] = m_0_6;
+            result_7[l] = m_0_7;
+            result_8[l] = m_0_8;
+            result_9[l] = m_0_9;
+            result_10[l] = m_0_1;
+            result_11[l] = m_1_1;
+            result_12[l] = m_1_2;
+            result_13[l] = m_1_3;
+            result_14[l] = m_1_4;
+            result_15[l] = m_1_5;
+            result_16[l] = m_1_6;
+            result_17[l] = m_1_7;
+            result_18[l] = m_1_8;
+            result_19[l] = m_1_9;
+            result_20[l] = m_0_2;
+            result_21[l] = m_1_2;
+            result_22[l] = m_2_2;
+            result_23[l] = m_2_3;
+            result_24[l] = m_2_4;
+            result_25[l] = m_2_5;
+            result_26[l] = m_2_6;
+            result_27[l] = m_2_7;
+            result_28[l] = m_2_8;
+            result_29[l] = m_2_9;
+            result_30[l] = m_0_3;
+            result_31[l] = m_1_3;
+            result_32[l] = m_2_3;
+            result_33[l] = m_3_3;
+            result_34[l] = m_3_4;
+            result_35[l] = m_3_5;
+            result_36[l] = m_3_6;
+            result_37[l] = m_3_7;
+            result_38[l] = m_3_8;
+            result_39[l] = m_3_9;
+            result_40[l] = m_0_4;
+            result_41[l] = m_1_4;
+            result_42[l] = m_2_4;
+            result_43[l] = m_3_4;
+            result_44[l] = m_4_4;
+            result_45[l] = m_4_5;
+            result_46[l] = m_4_6;
+            result_47[l] = m_4_7;
+            result_48[l] = m_4_8;
+            result_49[l] = m_4_9;
+            result_50[l] = m_0_5;
+            result_51[l] = m_1_5;
+            result_52[l] = m_2_5;
+            result_53[l] = m_3_5;
+            result_54[l] = m_4_5;
+            result_55[l] = m_5_5;
+            result_56[l] = m_5_6;
+            result_57[l] = m_5_7;
+            result_58[l] = m_5_8;
+            result_59[l] = m_5_9;
+            result_60[l] = m_0_6;
+            result_61[l] = m_1_6;
+            result_62[l] = m_2_6;
+            result_63[l] = m_3_6;
+            result_64[l] = m_4_6;
+            result_65[l] = m_5_6;
+            result_66[l] = m_6_6;
+            result_67[l] = m_6_7;
+            result_68[l] = m_6_8;
+            result_69[l] = m_6_9;
+            result_70[l] = m_0_7;
+            result_71[l] = m_1_7;
+            result_72[l] = m_2_7;
+            result_73[l] = m_3_7;
+            result_74[l] = m_4_7;
+            result_75[l] = m_5_7;
+            result_76[l] = m_6_7;
+            result_77[l] = m_7_7;
+            result_78[l] = m_7_8;
+            result_79[l] = m_7_9;
+            result_80[l] = m_0_8;
+            result_81[l] = m_1_8;
+            result_82[l] = m_2_8;
+            result_83[l] = m_3_8;
+            result_84[l] = m_4_8;
+            result_85[l] = m_5_8;
+            result_86[l] = m_6_8;
+            result_87[l] = m_7_8;
+            result_88[l] = m_8_8;
+            result_89[l] = m_8_9;
+            result_90[l] = m_0_9;
+            result_91[l] = m_1_9;
+            result_92[l] = m_2_9;
+            result_93[l] = m_3_9;
+            result_94[l] = m_4_9;
+            result_95[l] = m_5_9;
+            result_96[l] = m_6_9;
+            result_97[l] = m_7_9;
+            result_98[l] = m_8_9;
+            result_99[l] = 0.00835;
         }
-        m.give_pair(0, [&results[0], &results[1]]);
-        m.give_pair(2, [&results[2], &results[3]]);
-        m.give_pair(4, [&results[4], &results[5]]);
-        m.give_pair(6, [&results[6], &results[7]]);
-        m.give_pair(8, [&results[8], &results[9]]);
-        m.give_pair(10, [&results[10], &results[11]]);
-        m.give_pair(12, [&results[12], &results[13]]);
-        m.give_pair(14, [&results[14], &results[15]]);
-        m.give_pair(16, [&results[16], &results[17]]);
-        m.give_pair(18, [&results[18], &results[19]]);
-        m.give_pair(20, [&results[20], &results[21]]);
-        m.give_pair(22, [&results[22], &results[23]]);
-        m.give_pair(24, [&results[24], &results[25]]);
-        m.give_pair(26, [&results[26], &results[27]]);
-        m.give_pair(28, [&results[28], &results[29]]);
-        m.give_pair(30, [&results[30], &results[31]]);
-        m.give_pair(32, [&results[32], &results[33]]);
-        m.give_pair(34, [&results[34], &results[35]]);
-        m.give_pair(36, [&results[36], &results[37]]);
-        m.give_pair(38, [&results[38], &results[39]]);
-        m.give_pair(40, [&results[40], &results[41]]);
-        m.give_pair(42, [&results[42], &results[43]]);
-        m.give_pair(44, [&results[44], &results[45]]);
-        m.give_pair(46, [&results[46], &results[47]]);
-        m.give_pair(48, [&results[48], &results[49]]);
-        m.give_pair(50, [&results[50], &results[51]]);
-        m.give_pair(52, [&results[52], &results[53]]);
-        m.give_pair(54, [&results[54], &results[55]]);
-        m.give_pair(56, [&results[56], &results[57]]);
-        m.give_pair(58, [&results[58], &results[59]]);
-        m.give_pair(60, [&results[60], &results[61]]);
-        m.give_pair(62, [&results[62], &results[63]]);
-        m.give_pair(64, [&results[64], &results[65]]);
-        m.give_pair(66, [&results[66], &results[67]]);
-        m.give_pair(68, [&results[68], &results[69]]);
-        m.give_pair(70, [&results[70], &results[71]]);
-        m.give_pair(72, [&results[72], &results[73]]);
-        m.give_pair(74, [&results[74], &results[75]]);
-        m.give_pair(76, [&results[76], &results[77]]);
-        m.give_pair(78, [&results[78], &results[79]]);
-        m.give_pair(80, [&results[80], &results[81]]);
-        m.give_pair(82, [&results[82], &results[83]]);
-        m.give_pair(84, [&results[84], &results[85]]);
-        m.give_pair(86, [&results[86], &results[87]]);
-        m.give_pair(88, [&results[88], &results[89]]);
-        m.give_pair(90, [&results[90], &results[91]]);
-        m.give_pair(92, [&results[92], &results[93]]);
-        m.give_pair(94, [&results[94], &results[95]]);
-        m.give_pair(96, [&results[96], &results[97]]);
-        m.give_pair(98, [&results[98], &results[99]]);
+        m.give_pair(0, [&result_0, &result_1]);
+        m.give_pair(2, [&result_2, &result_3]);
+        m.give_pair(4, [&result_4, &result_5]);
+        m.give_pair(6, [&result_6, &result_7]);
+        m.give_pair(8, [&result_8, &result_9]);
+        m.give_pair(10, [&result_10, &result_11]);
+        m.give_pair(12, [&result_12, &result_13]);
+        m.give_pair(14, [&result_14, &result_15]);
+        m.give_pair(16, [&result_16, &result_17]);
+        m.give_pair(18, [&result_18, &result_19]);
+        m.give_pair(20, [&result_20, &result_21]);
+        m.give_pair(22, [&result_22, &result_23]);
+        m.give_pair(24, [&result_24, &result_25]);
+        m.give_pair(26, [&result_26, &result_27]);
+        m.give_pair(28, [&result_28, &result_29]);
+        m.give_pair(30, [&result_30, &result_31]);
+        m.give_pair(32, [&result_32, &result_33]);
+        m.give_pair(34, [&result_34, &result_35]);
+        m.give_pair(36, [&result_36, &result_37]);
+        m.give_pair(38, [&result_38, &result_39]);
+        m.give_pair(40, [&result_40, &result_41]);
+        m.give_pair(42, [&result_42, &result_43]);
+        m.give_pair(44, [&result_44, &result_45]);
+        m.give_pair(46, [&result_46, &result_47]);
+        m.give_pair(48, [&result_48, &result_49]);
+        m.give_pair(50, [&result_50, &result_51]);
+        m.give_pair(52, [&result_52, &result_53]);
+        m.give_pair(54, [&result_54, &result_55]);
+        m.give_pair(56, [&result_56, &result_57]);
+        m.give_pair(58, [&result_58, &result_59]);
+        m.give_pair(60, [&result_60, &result_61]);
+        m.give_pair(62, [&result_62, &result_63]);
+        m.give_pair(64, [&result_64, &result_65]);
+        m.give_pair(66, [&result_66, &result_67]);
+        m.give_pair(68, [&result_68, &result_69]);
+        m.give_pair(70, [&result_70, &result_71]);
+        m.give_pair(72, [&result_72, &result_73]);
+        m.give_pair(74, [&result_74, &result_75]);
+        m.give_pair(76, [&result_76, &result_77]);
+        m.give_pair(78, [&result_78, &result_79]);
+        m.give_pair(80, [&result_80, &result_81]);
+        m.give_pair(82, [&result_82, &result_83]);
+        m.give_pair(84, [&result_84, &result_85]);
+        m.give_pair(86, [&result_86, &result_87]);
+        m.give_pair(88, [&result_88, &result_89]);
+        m.give_pair(90, [&result_90, &result_91]);
+        m.give_pair(92, [&result_92, &result_93]);
+        m.give_pair(94, [&result_94, &result_95]);
+        m.give_pair(96, [&result_96, &result_97]);
+        m.give_pair(98, [&result_98, &result_99]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`.
@@ -4197,49 +4408,77 @@ impl Chain10Planar {
             angles[9][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 20]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = v.get(6, l); }
-        for l in 0..LANES { given[7][l] = v.get(7, l); }
-        for l in 0..LANES { given[8][l] = v.get(8, l); }
-        for l in 0..LANES { given[9][l] = v.get(9, l); }
-        for l in 0..LANES { given[10][l] = a.get(0, l); }
-        for l in 0..LANES { given[11][l] = a.get(1, l); }
-        for l in 0..LANES { given[12][l] = a.get(2, l); }
-        for l in 0..LANES { given[13][l] = a.get(3, l); }
-        for l in 0..LANES { given[14][l] = a.get(4, l); }
-        for l in 0..LANES { given[15][l] = a.get(5, l); }
-        for l in 0..LANES { given[16][l] = a.get(6, l); }
-        for l in 0..LANES { given[17][l] = a.get(7, l); }
-        for l in 0..LANES { given[18][l] = a.get(8, l); }
-        for l in 0..LANES { given[19][l] = a.get(9, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        let mut given_18 = [0.0; LANES];
+        let mut given_19 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = v.get(6, l); }
+        for l in 0..LANES { given_7[l] = v.get(7, l); }
+        for l in 0..LANES { given_8[l] = v.get(8, l); }
+        for l in 0..LANES { given_9[l] = v.get(9, l); }
+        for l in 0..LANES { given_10[l] = a.get(0, l); }
+        for l in 0..LANES { given_11[l] = a.get(1, l); }
+        for l in 0..LANES { given_12[l] = a.get(2, l); }
+        for l in 0..LANES { given_13[l] = a.get(3, l); }
+        for l in 0..LANES { given_14[l] = a.get(4, l); }
+        for l in 0..LANES { given_15[l] = a.get(5, l); }
+        for l in 0..LANES { given_16[l] = a.get(6, l); }
+        for l in 0..LANES { given_17[l] = a.get(7, l); }
+        for l in 0..LANES { given_18[l] = a.get(8, l); }
+        for l in 0..LANES { given_19[l] = a.get(9, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let v_6 = given[6][l];
-            let v_7 = given[7][l];
-            let v_8 = given[8][l];
-            let v_9 = given[9][l];
-            let a_0 = given[10][l];
-            let a_1 = given[11][l];
-            let a_2 = given[12][l];
-            let a_3 = given[13][l];
-            let a_4 = given[14][l];
-            let a_5 = given[15][l];
-            let a_6 = given[16][l];
-            let a_7 = given[17][l];
-            let a_8 = given[18][l];
-            let a_9 = given[19][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let v_6 = given_6[l];
+            let v_7 = given_7[l];
+            let v_8 = given_8[l];
+            let v_9 = given_9[l];
+            let a_0 = given_10[l];
+            let a_1 = given_11[l];
+            let a_2 = given_12[l];
+            let a_3 = given_13[l];
+            let a_4 = given_14[l];
+            let a_5 = given_15[l];
+            let a_6 = given_16[l];
+            let a_7 = given_17[l];
+            let a_8 = given_18[l];
+            let a_9 = given_19[l];
             // link1: sine and cosine, rotation
             let link1_sin = sines[0][l];
             let link1_cos = cosines[0][l];
@@ -4564,22 +4803,22 @@ impl Chain10Planar {
             let link2_t14 = 0.25 * link2_t13;
             let link2_t15 = tau_1 - link2_t14;
             let tau_0 = link1_f_rz + link2_t15;
-            results[0][l] = tau_0;
-            results[1][l] = tau_1;
-            results[2][l] = tau_2;
-            results[3][l] = tau_3;
-            results[4][l] = tau_4;
-            results[5][l] = tau_5;
-            results[6][l] = tau_6;
-            results[7][l] = tau_7;
-            results[8][l] = tau_8;
-            results[9][l] = link10_f_rz;
+            result_0[l] = tau_0;
+            result_1[l] = tau_1;
+            result_2[l] = tau_2;
+            result_3[l] = tau_3;
+            result_4[l] = tau_4;
+            result_5[l] = tau_5;
+            result_6[l] = tau_6;
+            result_7[l] = tau_7;
+            result_8[l] = tau_8;
+            result_9[l] = link10_f_rz;
         }
-        tau.give_pair(0, [&results[0], &results[1]]);
-        tau.give_pair(2, [&results[2], &results[3]]);
-        tau.give_pair(4, [&results[4], &results[5]]);
-        tau.give_pair(6, [&results[6], &results[7]]);
-        tau.give_pair(8, [&results[8], &results[9]]);
+        tau.give_pair(0, [&result_0, &result_1]);
+        tau.give_pair(2, [&result_2, &result_3]);
+        tau.give_pair(4, [&result_4, &result_5]);
+        tau.give_pair(6, [&result_6, &result_7]);
+        tau.give_pair(8, [&result_8, &result_9]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`.
@@ -4616,29 +4855,47 @@ impl Chain10Planar {
             angles[9][l] = q_9;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 10>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = v.get(6, l); }
-        for l in 0..LANES { given[7][l] = v.get(7, l); }
-        for l in 0..LANES { given[8][l] = v.get(8, l); }
-        for l in 0..LANES { given[9][l] = v.get(9, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = v.get(6, l); }
+        for l in 0..LANES { given_7[l] = v.get(7, l); }
+        for l in 0..LANES { given_8[l] = v.get(8, l); }
+        for l in 0..LANES { given_9[l] = v.get(9, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let v_6 = given[6][l];
-            let v_7 = given[7][l];
-            let v_8 = given[8][l];
-            let v_9 = given[9][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let v_6 = given_6[l];
+            let v_7 = given_7[l];
+            let v_8 = given_8[l];
+            let v_9 = given_9[l];
             // link1: sine and cosine, rotation
             let link1_sin = sines[0][l];
             let link1_cos = cosines[0][l];
@@ -4887,22 +5144,22 @@ impl Chain10Planar {
             let link2_t10 = 0.25 * link2_t9;
             let link2_t11 = h_1 - link2_t10;
             let h_0 = link1_f_rz + link2_t11;
-            results[0][l] = h_0;
-            results[1][l] = h_1;
-            results[2][l] = h_2;
-            results[3][l] = h_3;
-            results[4][l] = h_4;
-            results[5][l] = h_5;
-            results[6][l] = h_6;
-            results[7][l] = h_7;
-            results[8][l] = h_8;
-            results[9][l] = link10_f_rz;
+            result_0[l] = h_0;
+            result_1[l] = h_1;
+            result_2[l] = h_2;
+            result_3[l] = h_3;
+            result_4[l] = h_4;
+            result_5[l] = h_5;
+            result_6[l] = h_6;
+            result_7[l] = h_7;
+            result_8[l] = h_8;
+            result_9[l] = link10_f_rz;
         }
-        h.give_pair(0, [&results[0], &results[1]]);
-        h.give_pair(2, [&results[2], &results[3]]);
-        h.give_pair(4, [&results[4], &results[5]]);
-        h.give_pair(6, [&results[6], &results[7]]);
-        h.give_pair(8, [&results[8], &results[9]]);
+        h.give_pair(0, [&result_0, &result_1]);
+        h.give_pair(2, [&result_2, &result_3]);
+        h.give_pair(4, [&result_4, &result_5]);
+        h.give_pair(6, [&result_6, &result_7]);
+        h.give_pair(8, [&result_8, &result_9]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -4913,45 +5170,63 @@ impl Chain10Planar {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = v.get(6, l); }
-        for l in 0..LANES { given[7][l] = v.get(7, l); }
-        for l in 0..LANES { given[8][l] = v.get(8, l); }
-        for l in 0..LANES { given[9][l] = v.get(9, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = v.get(6, l); }
+        for l in 0..LANES { given_7[l] = v.get(7, l); }
+        for l in 0..LANES { given_8[l] = v.get(8, l); }
+        for l in 0..LANES { given_9[l] = v.get(9, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let v_6 = given[6][l];
-            let v_7 = given[7][l];
-            let v_8 = given[8][l];
-            let v_9 = given[9][l];
-            results[0][l] = v_0;
-            results[1][l] = v_1;
-            results[2][l] = v_2;
-            results[3][l] = v_3;
-            results[4][l] = v_4;
-            results[5][l] = v_5;
-            results[6][l] = v_6;
-            results[7][l] = v_7;
-            results[8][l] = v_8;
-            results[9][l] = v_9;
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let v_6 = given_6[l];
+            let v_7 = given_7[l];
+            let v_8 = given_8[l];
+            let v_9 = given_9[l];
+            result_0[l] = v_0;
+            result_1[l] = v_1;
+            result_2[l] = v_2;
+            result_3[l] = v_3;
+            result_4[l] = v_4;
+            result_5[l] = v_5;
+            result_6[l] = v_6;
+            result_7[l] = v_7;
+            result_8[l] = v_8;
+            result_9[l] = v_9;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
-        qd.give_pair(6, [&results[6], &results[7]]);
-        qd.give_pair(8, [&results[8], &results[9]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
+        qd.give_pair(6, [&result_6, &result_7]);
+        qd.give_pair(8, [&result_8, &result_9]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -70,7 +70,7 @@ impl Chain6 {
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 1129 operations: 508 additions, 616 multiplications, 5 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 6], p: &[f64; 6], qd: &mut [f64; 6], pd: &mut [f64; 6]) {
-        Self::rates_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &self.tau, qd, pd);
+        ::multibody::runtime::kernel::call_exact::<Self, 0, _>((q, p, &self.tau, qd, pd,));
     }
 
     #[inline(always)]
@@ -97,34 +97,56 @@ impl Chain6 {
             angles[5][l] = link6_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(4, l); }
-        for l in 0..LANES { given[5][l] = p.get(5, l); }
-        for l in 0..LANES { given[6][l] = tau.get(0, l); }
-        for l in 0..LANES { given[7][l] = tau.get(1, l); }
-        for l in 0..LANES { given[8][l] = tau.get(2, l); }
-        for l in 0..LANES { given[9][l] = tau.get(3, l); }
-        for l in 0..LANES { given[10][l] = tau.get(4, l); }
-        for l in 0..LANES { given[11][l] = tau.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(4, l); }
+        for l in 0..LANES { given_5[l] = p.get(5, l); }
+        for l in 0..LANES { given_6[l] = tau.get(0, l); }
+        for l in 0..LANES { given_7[l] = tau.get(1, l); }
+        for l in 0..LANES { given_8[l] = tau.get(2, l); }
+        for l in 0..LANES { given_9[l] = tau.get(3, l); }
+        for l in 0..LANES { given_10[l] = tau.get(4, l); }
+        for l in 0..LANES { given_11[l] = tau.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
         for l in 0..LANES {
             let (p_0, p_1, p_2, p_3, p_4, p_5, tau_0, tau_1, tau_2, tau_3, tau_4, tau_5, link1_sin, link1_cos, link2_sin, link2_cos, link3_sin, link3_cos, link4_sin, link4_cos, link5_sin, link5_cos, link6_sin, link6_cos, link2_t3, link2_t6, link2_t7, link2_t8, link3_t6, link3_t11, link3_t13, link4_t3, link4_t7, link4_t14, link4_t17, link4_t19, link4_t21, link4_t28, link4_t34, link4_t44, link4_t47, link4_t50, link4_t53, link6_u_x, link6_minus_u_y, link6_minus_mp_ry_ry, link6_minus_mp_rx_ry, link6_mp_rx_rx, link6_u_rx, link6_u_ry, link5_m_rx_z, link5_m_ry_z, link5_minus_m_rz_rz, link6_t42, link5_minus_u_x, link5_minus_u_y, link5_minus_mp_rx_ry, link5_minus_u_rx, link5_minus_u_ry, link5_mp_rx_rx, link5_minus_mp_ry_ry, link5_t26, link5_t29, link5_t37, link5_t39, link4_minus_m_rx_y, link4_minus_m_rx_z, link4_m_ry_z, link4_minus_m_rz_rz, link5_t69, link5_t72, link5_t80, link5_t82, link5_t83, link5_t84, link5_t92, link5_t94, link4_u_x, link4_u_y, link4_minus_mp_rx_ry, link4_u_rx, link4_u_ry, link4_mp_rx_rx, link4_minus_mp_ry_ry, link4_t79, link4_t80) = {
-                let p_0 = given[0][l];
-                let p_1 = given[1][l];
-                let p_2 = given[2][l];
-                let p_3 = given[3][l];
-                let p_4 = given[4][l];
-                let p_5 = given[5][l];
-                let tau_0 = given[6][l];
-                let tau_1 = given[7][l];
-                let tau_2 = given[8][l];
-                let tau_3 = given[9][l];
-                let tau_4 = given[10][l];
-                let tau_5 = given[11][l];
+                let p_0 = given_0[l];
+                let p_1 = given_1[l];
+                let p_2 = given_2[l];
+                let p_3 = given_3[l];
+                let p_4 = given_4[l];
+                let p_5 = given_5[l];
+                let tau_0 = given_6[l];
+                let tau_1 = given_7[l];
+                let tau_2 = given_8[l];
+                let tau_3 = given_9[l];
+                let tau_4 = given_10[l];
+                let tau_5 = given_11[l];
                 // link1: sine and cosine, rotation
                 let link1_sin = sines[0][l];
                 let link1_cos = cosines[0][l];
@@ -1317,31 +1339,31 @@ impl Chain6 {
                 let pd_5 = tau_5 + link6_t83;
                 (pd_0, pd_1, pd_2, pd_3, pd_4, pd_5)
             };
-            results[0][l] = -link1_minus_v;
-            results[1][l] = -link2_minus_v;
-            results[2][l] = -link3_minus_v;
-            results[3][l] = -link4_minus_v;
-            results[4][l] = -link5_minus_v;
-            results[5][l] = link6_v;
-            results[6][l] = pd_0;
-            results[7][l] = pd_1;
-            results[8][l] = pd_2;
-            results[9][l] = pd_3;
-            results[10][l] = pd_4;
-            results[11][l] = pd_5;
+            result_0[l] = -link1_minus_v;
+            result_1[l] = -link2_minus_v;
+            result_2[l] = -link3_minus_v;
+            result_3[l] = -link4_minus_v;
+            result_4[l] = -link5_minus_v;
+            result_5[l] = link6_v;
+            result_6[l] = pd_0;
+            result_7[l] = pd_1;
+            result_8[l] = pd_2;
+            result_9[l] = pd_3;
+            result_10[l] = pd_4;
+            result_11[l] = pd_5;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
-        pd.give_pair(0, [&results[6], &results[7]]);
-        pd.give_pair(2, [&results[8], &results[9]]);
-        pd.give_pair(4, [&results[10], &results[11]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
+        pd.give_pair(0, [&result_6, &result_7]);
+        pd.give_pair(2, [&result_8, &result_9]);
+        pd.give_pair(4, [&result_10, &result_11]);
     }
 
     /// Velocities from momenta.
     /// 702 operations: 325 additions, 372 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 6], p: &[f64; 6], v: &mut [f64; 6]) {
-        Self::velocities_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, v);
+        ::multibody::runtime::kernel::call_exact::<Self, 1, _>((q, p, v,));
     }
 
     #[inline(always)]
@@ -1365,22 +1387,32 @@ impl Chain6 {
             angles[4][l] = link6_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(4, l); }
-        for l in 0..LANES { given[5][l] = p.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(4, l); }
+        for l in 0..LANES { given_5[l] = p.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
             let (p_0, p_1, p_2, p_3, p_4, p_5, link2_sin, link2_cos, link3_sin, link3_cos, link4_sin, link4_cos, link2_t3, link2_t6, link2_t7, link2_t8, link3_t6, link3_t11, link3_t13, link4_t3, link4_t7, link4_t14, link4_t17, link4_t19, link4_t21, link4_t28, link4_t34, link4_t44, link4_t47, link4_t50, link4_t53, link5_minus_m_rz_rz, link6_t42, link5_minus_u_x, link5_minus_u_rx, link4_minus_m_rx_y, link4_minus_m_rz_rz, link5_t72, link5_t82, link5_t83, link5_t84, link5_t92, link5_t94, link4_u_x, link4_u_y, link4_minus_mp_rx_ry, link4_u_rx, link4_u_ry, link4_mp_rx_rx, link4_minus_mp_ry_ry, link4_t79, link4_t82, link4_t85, link4_t88) = {
-                let p_0 = given[0][l];
-                let p_1 = given[1][l];
-                let p_2 = given[2][l];
-                let p_3 = given[3][l];
-                let p_4 = given[4][l];
-                let p_5 = given[5][l];
+                let p_0 = given_0[l];
+                let p_1 = given_1[l];
+                let p_2 = given_2[l];
+                let p_3 = given_3[l];
+                let p_4 = given_4[l];
+                let p_5 = given_5[l];
                 // link2: sine and cosine, rotation
                 let link2_sin = sines[0][l];
                 let link2_cos = cosines[0][l];
@@ -2119,22 +2151,22 @@ impl Chain6 {
                 let link6_v = ground_t113 - ground_t114;
                 (link1_minus_v, link2_minus_v, link3_minus_v, link4_minus_v, link5_minus_v, link6_v)
             };
-            results[0][l] = -link1_minus_v;
-            results[1][l] = -link2_minus_v;
-            results[2][l] = -link3_minus_v;
-            results[3][l] = -link4_minus_v;
-            results[4][l] = -link5_minus_v;
-            results[5][l] = link6_v;
+            result_0[l] = -link1_minus_v;
+            result_1[l] = -link2_minus_v;
+            result_2[l] = -link3_minus_v;
+            result_3[l] = -link4_minus_v;
+            result_4[l] = -link5_minus_v;
+            result_5[l] = link6_v;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        v.give_pair(2, [&results[2], &results[3]]);
-        v.give_pair(4, [&results[4], &results[5]]);
+        v.give_pair(0, [&result_0, &result_1]);
+        v.give_pair(2, [&result_2, &result_3]);
+        v.give_pair(4, [&result_4, &result_5]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
     /// 433 operations: 180 additions, 253 multiplications, 0 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     pub fn momenta(&self, q: &[f64; 6], v: &[f64; 6], p: &mut [f64; 6]) {
-        Self::momenta_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, p);
+        ::multibody::runtime::kernel::call_exact::<Self, 2, _>((q, v, p,));
     }
 
     #[inline(always)]
@@ -2158,22 +2190,32 @@ impl Chain6 {
             angles[4][l] = link6_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
             let (link2_sin, link2_cos, link3_sin, link3_cos, link4_sin, link4_cos, link5_sin, link5_cos, link1_t0, link2_t22, link2_t23, link2_t26, link2_t32, link2_t33, link2_t34, link3_t40, link3_t41, link3_t44, link3_t50, link3_t51, link3_t52, link4_t40, link4_t41, link4_t44, link4_t50, link4_t51, link4_t52, link5_t40, link5_t41, link5_t44, link5_t50, link5_t51, link5_t52, link6_minus_p_rz, link6_t35, link6_t39, link6_t45, link6_t48, link6_t51, link6_t54) = {
-                let v_0 = given[0][l];
-                let v_1 = given[1][l];
-                let v_2 = given[2][l];
-                let v_3 = given[3][l];
-                let v_4 = given[4][l];
-                let v_5 = given[5][l];
+                let v_0 = given_0[l];
+                let v_1 = given_1[l];
+                let v_2 = given_2[l];
+                let v_3 = given_3[l];
+                let v_4 = given_4[l];
+                let v_5 = given_5[l];
                 // link2: sine and cosine, rotation
                 let link2_sin = sines[0][l];
                 let link2_cos = cosines[0][l];
@@ -2638,23 +2680,23 @@ impl Chain6 {
                 let link1_p_rz = link1_t0 - link2_t53;
                 (link5_p_rz, link4_p_rz, link3_p_rz, link2_p_rz, link1_p_rz)
             };
-            results[0][l] = link1_p_rz;
-            results[1][l] = link2_p_rz;
-            results[2][l] = link3_p_rz;
-            results[3][l] = link4_p_rz;
-            results[4][l] = link5_p_rz;
-            results[5][l] = -link6_minus_p_rz;
+            result_0[l] = link1_p_rz;
+            result_1[l] = link2_p_rz;
+            result_2[l] = link3_p_rz;
+            result_3[l] = link4_p_rz;
+            result_4[l] = link5_p_rz;
+            result_5[l] = -link6_minus_p_rz;
         }
-        p.give_pair(0, [&results[0], &results[1]]);
-        p.give_pair(2, [&results[2], &results[3]]);
-        p.give_pair(4, [&results[4], &results[5]]);
+        p.give_pair(0, [&result_0, &result_1]);
+        p.give_pair(2, [&result_2, &result_3]);
+        p.give_pair(4, [&result_4, &result_5]);
     }
 
     /// Kinetic and potential energy, J.
     /// 731 operations: 338 additions, 388 multiplications, 5 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 6], p: &[f64; 6]) -> [f64; 2] {
         let mut energy = [0.0; 2];
-        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut energy);
+        ::multibody::runtime::kernel::call_exact::<Self, 3, _>((q, p, &mut energy,));
         energy
     }
 
@@ -2682,22 +2724,28 @@ impl Chain6 {
             angles[5][l] = link6_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(4, l); }
-        for l in 0..LANES { given[5][l] = p.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(4, l); }
+        for l in 0..LANES { given_5[l] = p.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
             let (p_0, p_1, p_2, p_3, p_4, p_5, link1_sin, link1_cos, link2_sin, link2_cos, link3_sin, link3_cos, link4_sin, link4_cos, link2_t3, link2_t6, link2_t7, link2_t8, link3_t6, link3_t11, link3_t13, link4_t3, link4_t7, link4_t14, link4_t17, link4_t19, link4_t21, link4_t28, link4_t34, link4_t44, link4_t47, link4_t50, link4_t53, link5_minus_m_rz_rz, link6_t42, link5_minus_u_x, link5_minus_u_rx, link4_minus_m_rx_y, link4_minus_m_rz_rz, link5_t72, link5_t80, link5_t82, link5_t83, link5_t84, link5_t92, link5_t94, link4_u_x, link4_u_y, link4_minus_mp_rx_ry, link4_u_rx, link4_u_ry, link4_mp_rx_rx, link4_minus_mp_ry_ry, link4_t79, link4_t82, link4_t85, link4_t86) = {
-                let p_0 = given[0][l];
-                let p_1 = given[1][l];
-                let p_2 = given[2][l];
-                let p_3 = given[3][l];
-                let p_4 = given[4][l];
-                let p_5 = given[5][l];
+                let p_0 = given_0[l];
+                let p_1 = given_1[l];
+                let p_2 = given_2[l];
+                let p_3 = given_3[l];
+                let p_4 = given_4[l];
+                let p_5 = given_5[l];
                 // link1: sine and cosine, rotation
                 let link1_sin = sines[0][l];
                 let link1_cos = cosines[0][l];
@@ -3470,16 +3518,16 @@ impl Chain6 {
                 let energy_1 = 9.81 * link1_t42;
                 (energy_0, energy_1)
             };
-            results[0][l] = energy_0;
-            results[1][l] = energy_1;
+            result_0[l] = energy_0;
+            result_1[l] = energy_1;
         }
-        energy.give_pair(0, [&results[0], &results[1]]);
+        energy.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
     /// 1363 operations: 622 additions, 736 multiplications, 5 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 6], v: &[f64; 6], a: &mut [f64; 6]) {
-        Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, a);
+        ::multibody::runtime::kernel::call_exact::<Self, 4, _>((q, v, &self.tau, a,));
     }
 
     #[inline(always)]
@@ -3506,34 +3554,50 @@ impl Chain6 {
             angles[5][l] = link6_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = tau.get(0, l); }
-        for l in 0..LANES { given[7][l] = tau.get(1, l); }
-        for l in 0..LANES { given[8][l] = tau.get(2, l); }
-        for l in 0..LANES { given[9][l] = tau.get(3, l); }
-        for l in 0..LANES { given[10][l] = tau.get(4, l); }
-        for l in 0..LANES { given[11][l] = tau.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = tau.get(0, l); }
+        for l in 0..LANES { given_7[l] = tau.get(1, l); }
+        for l in 0..LANES { given_8[l] = tau.get(2, l); }
+        for l in 0..LANES { given_9[l] = tau.get(3, l); }
+        for l in 0..LANES { given_10[l] = tau.get(4, l); }
+        for l in 0..LANES { given_11[l] = tau.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
             let (v_0, v_1, v_2, v_3, v_4, v_5, tau_0, tau_1, tau_2, tau_3, tau_4, tau_5, link1_sin, link1_cos, link2_sin, link2_cos, link3_sin, link3_cos, link4_sin, link4_cos, link5_sin, link5_cos, link6_sin, link6_cos, link3_t3, link3_t7, link3_t14, link3_t19, link3_t21, link4_t3, link4_t7, link4_t14, link4_t17, link4_t19, link4_t21, link4_t28, link4_t34, link4_t44, link4_t47, link4_t50, link4_t53, link5_minus_m_rz_rz, link6_t42, link5_minus_u_x, link5_minus_u_rx, link5_t37, link4_minus_m_rx_y, link4_minus_m_rz_rz, link5_t69, link5_t72, link5_t80, link5_t82, link5_t83, link5_t84, link5_t92, link5_t94, link4_u_x, link4_u_y, link4_minus_mp_rx_ry, link4_u_rx, link4_u_ry, link4_mp_rx_rx, link4_minus_mp_ry_ry, link4_t79, link4_t80) = {
-                let v_0 = given[0][l];
-                let v_1 = given[1][l];
-                let v_2 = given[2][l];
-                let v_3 = given[3][l];
-                let v_4 = given[4][l];
-                let v_5 = given[5][l];
-                let tau_0 = given[6][l];
-                let tau_1 = given[7][l];
-                let tau_2 = given[8][l];
-                let tau_3 = given[9][l];
-                let tau_4 = given[10][l];
-                let tau_5 = given[11][l];
+                let v_0 = given_0[l];
+                let v_1 = given_1[l];
+                let v_2 = given_2[l];
+                let v_3 = given_3[l];
+                let v_4 = given_4[l];
+                let v_5 = given_5[l];
+                let tau_0 = given_6[l];
+                let tau_1 = given_7[l];
+                let tau_2 = given_8[l];
+                let tau_3 = given_9[l];
+                let tau_4 = given_10[l];
+                let tau_5 = given_11[l];
                 // link1: sine and cosine, rotation
                 let link1_sin = sines[0][l];
                 let link1_cos = cosines[0][l];
@@ -4969,16 +5033,16 @@ impl Chain6 {
                 let a_5 = link6_t60 + link6_a;
                 (link1_minus_a, link2_minus_a, minus_a_2, a_3, a_4, a_5)
             };
-            results[0][l] = -link1_minus_a;
-            results[1][l] = -link2_minus_a;
-            results[2][l] = -minus_a_2;
-            results[3][l] = a_3;
-            results[4][l] = a_4;
-            results[5][l] = a_5;
+            result_0[l] = -link1_minus_a;
+            result_1[l] = -link2_minus_a;
+            result_2[l] = -minus_a_2;
+            result_3[l] = a_3;
+            result_4[l] = a_4;
+            result_5[l] = a_5;
         }
-        a.give_pair(0, [&results[0], &results[1]]);
-        a.give_pair(2, [&results[2], &results[3]]);
-        a.give_pair(4, [&results[4], &results[5]]);
+        a.give_pair(0, [&result_0, &result_1]);
+        a.give_pair(2, [&result_2, &result_3]);
+        a.give_pair(4, [&result_4, &result_5]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -4989,31 +5053,41 @@ impl Chain6 {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            results[0][l] = v_0;
-            results[1][l] = v_1;
-            results[2][l] = v_2;
-            results[3][l] = v_3;
-            results[4][l] = v_4;
-            results[5][l] = v_5;
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            result_0[l] = v_0;
+            result_1[l] = v_1;
+            result_2[l] = v_2;
+            result_3[l] = v_3;
+            result_4[l] = v_4;
+            result_5[l] = v_5;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

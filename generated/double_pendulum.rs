@@ -81,17 +81,23 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = tau.get(0, l); }
-        for l in 0..LANES { given[3][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = tau.get(0, l); }
+        for l in 0..LANES { given_3[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
-            let tau_0 = given[2][l];
-            let tau_1 = given[3][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
+            let tau_0 = given_2[l];
+            let tau_1 = given_3[l];
             // upper: sine and cosine, rotation
             let upper_sin = sines[0][l];
             let upper_cos = cosines[0][l];
@@ -139,13 +145,13 @@ impl DoublePendulum {
             let lower_t8 = lower_t6 + lower_t7;
             let pd_0 = tau_0 - upper_t8;
             let pd_1 = tau_1 - lower_t8;
-            results[0][l] = upper_e;
-            results[1][l] = lower_v;
-            results[2][l] = pd_0;
-            results[3][l] = pd_1;
+            result_0[l] = upper_e;
+            result_1[l] = lower_v;
+            result_2[l] = pd_0;
+            result_3[l] = pd_1;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        pd.give_pair(0, [&results[2], &results[3]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        pd.give_pair(0, [&result_2, &result_3]);
     }
 
     /// Velocities from momenta.
@@ -163,13 +169,15 @@ impl DoublePendulum {
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
             // lower: sine and cosine, rotation
             let lower_cos = cosines[0][l];
             // lower: inertia carried to the parent, M* (4.48)
@@ -191,10 +199,10 @@ impl DoublePendulum {
             // upper: velocity and joint rate (4.40)
             let upper_t5 = upper_t0 * upper_e;
             let lower_v = upper_t2 - upper_t5;
-            results[0][l] = upper_e;
-            results[1][l] = lower_v;
+            result_0[l] = upper_e;
+            result_1[l] = lower_v;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
+        v.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -212,13 +220,15 @@ impl DoublePendulum {
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
             // lower: sine and cosine, rotation
             let lower_cos = cosines[0][l];
             // lower: velocity and joint rate (4.40)
@@ -234,10 +244,10 @@ impl DoublePendulum {
             let lower_t2 = lower_cos * lower_p_y;
             let lower_t3 = lower_p_rz + lower_t2;
             let upper_p_rz = upper_t0 + lower_t3;
-            results[0][l] = upper_p_rz;
-            results[1][l] = lower_p_rz;
+            result_0[l] = upper_p_rz;
+            result_1[l] = lower_p_rz;
         }
-        p.give_pair(0, [&results[0], &results[1]]);
+        p.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Kinetic and potential energy, J.
@@ -259,13 +269,15 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
             // upper: sine and cosine, rotation
             let upper_sin = sines[0][l];
             let upper_cos = cosines[0][l];
@@ -305,10 +317,10 @@ impl DoublePendulum {
             let energy_0 = 0.5 * lower_t4;
             // ground: energy
             let energy_1 = 9.81 * upper_minus_mp_rx_z;
-            results[0][l] = energy_0;
-            results[1][l] = energy_1;
+            result_0[l] = energy_0;
+            result_1[l] = energy_1;
         }
-        energy.give_pair(0, [&results[0], &results[1]]);
+        energy.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
@@ -328,17 +340,21 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = tau.get(0, l); }
-        for l in 0..LANES { given[3][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = tau.get(0, l); }
+        for l in 0..LANES { given_3[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let tau_0 = given[2][l];
-            let tau_1 = given[3][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let tau_0 = given_2[l];
+            let tau_1 = given_3[l];
             // upper: sine and cosine, rotation
             let upper_sin = sines[0][l];
             let upper_cos = cosines[0][l];
@@ -385,10 +401,10 @@ impl DoublePendulum {
             let lower_t9 = lower_k_y * upper_minus_e;
             let lower_omegad_rz = lower_e + lower_t9;
             let lower_a = upper_minus_e + lower_omegad_rz;
-            results[0][l] = -upper_minus_e;
-            results[1][l] = lower_a;
+            result_0[l] = -upper_minus_e;
+            result_1[l] = lower_a;
         }
-        a.give_pair(0, [&results[0], &results[1]]);
+        a.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Wrench `[force; moment]` that each joint transmits to its child, in the child's body frame, N and N m.
@@ -408,17 +424,31 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = tau.get(0, l); }
-        for l in 0..LANES { given[3][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = tau.get(0, l); }
+        for l in 0..LANES { given_3[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let tau_0 = given[2][l];
-            let tau_1 = given[3][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let tau_0 = given_2[l];
+            let tau_1 = given_3[l];
             // upper: sine and cosine, rotation
             let upper_sin = sines[0][l];
             let upper_cos = cosines[0][l];
@@ -499,25 +529,25 @@ impl DoublePendulum {
             let reactions_0_2 = upper_minus_f_x + lower_t19;
             let reactions_0_0 = lower_t22 - upper_f_y;
             let minus_reactions_0_4 = upper_minus_f_rz + lower_t23;
-            results[0][l] = reactions_0_0;
-            results[1][l] = 0.0;
-            results[2][l] = reactions_0_2;
-            results[3][l] = 0.0;
-            results[4][l] = -minus_reactions_0_4;
-            results[5][l] = 0.0;
-            results[6][l] = -lower_f_y;
-            results[7][l] = 0.0;
-            results[8][l] = lower_minus_f_x_2;
-            results[9][l] = 0.0;
-            results[10][l] = -lower_minus_f_rz;
-            results[11][l] = 0.0;
+            result_0[l] = reactions_0_0;
+            result_1[l] = 0.0;
+            result_2[l] = reactions_0_2;
+            result_3[l] = 0.0;
+            result_4[l] = -minus_reactions_0_4;
+            result_5[l] = 0.0;
+            result_6[l] = -lower_f_y;
+            result_7[l] = 0.0;
+            result_8[l] = lower_minus_f_x_2;
+            result_9[l] = 0.0;
+            result_10[l] = -lower_minus_f_rz;
+            result_11[l] = 0.0;
         }
-        reactions.give_pair(0, [&results[0], &results[1]]);
-        reactions.give_pair(2, [&results[2], &results[3]]);
-        reactions.give_pair(4, [&results[4], &results[5]]);
-        reactions.give_pair(6, [&results[6], &results[7]]);
-        reactions.give_pair(8, [&results[8], &results[9]]);
-        reactions.give_pair(10, [&results[10], &results[11]]);
+        reactions.give_pair(0, [&result_0, &result_1]);
+        reactions.give_pair(2, [&result_2, &result_3]);
+        reactions.give_pair(4, [&result_4, &result_5]);
+        reactions.give_pair(6, [&result_6, &result_7]);
+        reactions.give_pair(8, [&result_8, &result_9]);
+        reactions.give_pair(10, [&result_10, &result_11]);
     }
 
     /// Mass matrix, by rows.
@@ -535,7 +565,10 @@ impl DoublePendulum {
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
             // lower: sine and cosine, rotation
             let lower_cos = cosines[0][l];
@@ -545,13 +578,13 @@ impl DoublePendulum {
             let lower_t1 = lower_t0 + lower_t0;
             let lower_t2 = lower_t1 + 0.33340000000000003;
             let m_0_0 = lower_t2 + 1.3334000000000001;
-            results[0][l] = m_0_0;
-            results[1][l] = m_0_1;
-            results[2][l] = m_0_1;
-            results[3][l] = 0.33340000000000003;
+            result_0[l] = m_0_0;
+            result_1[l] = m_0_1;
+            result_2[l] = m_0_1;
+            result_3[l] = 0.33340000000000003;
         }
-        m.give_pair(0, [&results[0], &results[1]]);
-        m.give_pair(2, [&results[2], &results[3]]);
+        m.give_pair(0, [&result_0, &result_1]);
+        m.give_pair(2, [&result_2, &result_3]);
     }
 
     /// Rotation, position and velocity of frames. The rotation takes components in the frame's axes to ground axes; the
@@ -573,13 +606,67 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 54]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
+        let mut result_18 = [0.0; LANES];
+        let mut result_19 = [0.0; LANES];
+        let mut result_20 = [0.0; LANES];
+        let mut result_21 = [0.0; LANES];
+        let mut result_22 = [0.0; LANES];
+        let mut result_23 = [0.0; LANES];
+        let mut result_24 = [0.0; LANES];
+        let mut result_25 = [0.0; LANES];
+        let mut result_26 = [0.0; LANES];
+        let mut result_27 = [0.0; LANES];
+        let mut result_28 = [0.0; LANES];
+        let mut result_29 = [0.0; LANES];
+        let mut result_30 = [0.0; LANES];
+        let mut result_31 = [0.0; LANES];
+        let mut result_32 = [0.0; LANES];
+        let mut result_33 = [0.0; LANES];
+        let mut result_34 = [0.0; LANES];
+        let mut result_35 = [0.0; LANES];
+        let mut result_36 = [0.0; LANES];
+        let mut result_37 = [0.0; LANES];
+        let mut result_38 = [0.0; LANES];
+        let mut result_39 = [0.0; LANES];
+        let mut result_40 = [0.0; LANES];
+        let mut result_41 = [0.0; LANES];
+        let mut result_42 = [0.0; LANES];
+        let mut result_43 = [0.0; LANES];
+        let mut result_44 = [0.0; LANES];
+        let mut result_45 = [0.0; LANES];
+        let mut result_46 = [0.0; LANES];
+        let mut result_47 = [0.0; LANES];
+        let mut result_48 = [0.0; LANES];
+        let mut result_49 = [0.0; LANES];
+        let mut result_50 = [0.0; LANES];
+        let mut result_51 = [0.0; LANES];
+        let mut result_52 = [0.0; LANES];
+        let mut result_53 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
             // upper: sine and cosine, rotation
             let upper_sin = sines[0][l];
             let upper_cos = cosines[0][l];
@@ -600,89 +687,89 @@ impl DoublePendulum {
             let minus_position_2_0 = upper_sin + rotation_3_2;
             let minus_position_2_2 = upper_cos + rotation_3_0;
             let minus_velocity_2_0 = lower_hat_y + lower_omega_rz;
-            results[0][l] = upper_cos;
-            results[1][l] = 0.0;
-            results[2][l] = upper_sin;
-            results[3][l] = 0.0;
-            results[4][l] = 1.0;
-            results[5][l] = 0.0;
-            results[6][l] = -upper_sin;
-            results[7][l] = 0.0;
-            results[8][l] = upper_cos;
-            results[9][l] = rotation_3_0;
-            results[10][l] = 0.0;
-            results[11][l] = rotation_3_2;
-            results[12][l] = 0.0;
-            results[13][l] = 1.0;
-            results[14][l] = 0.0;
-            results[15][l] = -rotation_3_2;
-            results[16][l] = 0.0;
-            results[17][l] = rotation_3_0;
-            results[18][l] = rotation_3_0;
-            results[19][l] = 0.0;
-            results[20][l] = rotation_3_2;
-            results[21][l] = 0.0;
-            results[22][l] = 1.0;
-            results[23][l] = 0.0;
-            results[24][l] = -rotation_3_2;
-            results[25][l] = 0.0;
-            results[26][l] = rotation_3_0;
-            results[27][l] = 0.0;
-            results[28][l] = 0.0;
-            results[29][l] = 0.0;
-            results[30][l] = -upper_sin;
-            results[31][l] = 0.0;
-            results[32][l] = -upper_cos;
-            results[33][l] = -minus_position_2_0;
-            results[34][l] = 0.0;
-            results[35][l] = -minus_position_2_2;
-            results[36][l] = 0.0;
-            results[37][l] = 0.0;
-            results[38][l] = 0.0;
-            results[39][l] = 0.0;
-            results[40][l] = v_0;
-            results[41][l] = 0.0;
-            results[42][l] = -lower_hat_y;
-            results[43][l] = 0.0;
-            results[44][l] = -lower_hat_x;
-            results[45][l] = 0.0;
-            results[46][l] = lower_omega_rz;
-            results[47][l] = 0.0;
-            results[48][l] = -minus_velocity_2_0;
-            results[49][l] = 0.0;
-            results[50][l] = -lower_hat_x;
-            results[51][l] = 0.0;
-            results[52][l] = lower_omega_rz;
-            results[53][l] = 0.0;
+            result_0[l] = upper_cos;
+            result_1[l] = 0.0;
+            result_2[l] = upper_sin;
+            result_3[l] = 0.0;
+            result_4[l] = 1.0;
+            result_5[l] = 0.0;
+            result_6[l] = -upper_sin;
+            result_7[l] = 0.0;
+            result_8[l] = upper_cos;
+            result_9[l] = rotation_3_0;
+            result_10[l] = 0.0;
+            result_11[l] = rotation_3_2;
+            result_12[l] = 0.0;
+            result_13[l] = 1.0;
+            result_14[l] = 0.0;
+            result_15[l] = -rotation_3_2;
+            result_16[l] = 0.0;
+            result_17[l] = rotation_3_0;
+            result_18[l] = rotation_3_0;
+            result_19[l] = 0.0;
+            result_20[l] = rotation_3_2;
+            result_21[l] = 0.0;
+            result_22[l] = 1.0;
+            result_23[l] = 0.0;
+            result_24[l] = -rotation_3_2;
+            result_25[l] = 0.0;
+            result_26[l] = rotation_3_0;
+            result_27[l] = 0.0;
+            result_28[l] = 0.0;
+            result_29[l] = 0.0;
+            result_30[l] = -upper_sin;
+            result_31[l] = 0.0;
+            result_32[l] = -upper_cos;
+            result_33[l] = -minus_position_2_0;
+            result_34[l] = 0.0;
+            result_35[l] = -minus_position_2_2;
+            result_36[l] = 0.0;
+            result_37[l] = 0.0;
+            result_38[l] = 0.0;
+            result_39[l] = 0.0;
+            result_40[l] = v_0;
+            result_41[l] = 0.0;
+            result_42[l] = -lower_hat_y;
+            result_43[l] = 0.0;
+            result_44[l] = -lower_hat_x;
+            result_45[l] = 0.0;
+            result_46[l] = lower_omega_rz;
+            result_47[l] = 0.0;
+            result_48[l] = -minus_velocity_2_0;
+            result_49[l] = 0.0;
+            result_50[l] = -lower_hat_x;
+            result_51[l] = 0.0;
+            result_52[l] = lower_omega_rz;
+            result_53[l] = 0.0;
         }
-        rotation.give_pair(0, [&results[0], &results[1]]);
-        rotation.give_pair(2, [&results[2], &results[3]]);
-        rotation.give_pair(4, [&results[4], &results[5]]);
-        rotation.give_pair(6, [&results[6], &results[7]]);
-        rotation.give_pair(8, [&results[8], &results[9]]);
-        rotation.give_pair(10, [&results[10], &results[11]]);
-        rotation.give_pair(12, [&results[12], &results[13]]);
-        rotation.give_pair(14, [&results[14], &results[15]]);
-        rotation.give_pair(16, [&results[16], &results[17]]);
-        rotation.give_pair(18, [&results[18], &results[19]]);
-        rotation.give_pair(20, [&results[20], &results[21]]);
-        rotation.give_pair(22, [&results[22], &results[23]]);
-        rotation.give_pair(24, [&results[24], &results[25]]);
-        rotation.give(26, &results[26]);
-        position.give_pair(0, [&results[27], &results[28]]);
-        position.give_pair(2, [&results[29], &results[30]]);
-        position.give_pair(4, [&results[31], &results[32]]);
-        position.give_pair(6, [&results[33], &results[34]]);
-        position.give(8, &results[35]);
-        velocity.give_pair(0, [&results[36], &results[37]]);
-        velocity.give_pair(2, [&results[38], &results[39]]);
-        velocity.give_pair(4, [&results[40], &results[41]]);
-        velocity.give_pair(6, [&results[42], &results[43]]);
-        velocity.give_pair(8, [&results[44], &results[45]]);
-        velocity.give_pair(10, [&results[46], &results[47]]);
-        velocity.give_pair(12, [&results[48], &results[49]]);
-        velocity.give_pair(14, [&results[50], &results[51]]);
-        velocity.give_pair(16, [&results[52], &results[53]]);
+        rotation.give_pair(0, [&result_0, &result_1]);
+        rotation.give_pair(2, [&result_2, &result_3]);
+        rotation.give_pair(4, [&result_4, &result_5]);
+        rotation.give_pair(6, [&result_6, &result_7]);
+        rotation.give_pair(8, [&result_8, &result_9]);
+        rotation.give_pair(10, [&result_10, &result_11]);
+        rotation.give_pair(12, [&result_12, &result_13]);
+        rotation.give_pair(14, [&result_14, &result_15]);
+        rotation.give_pair(16, [&result_16, &result_17]);
+        rotation.give_pair(18, [&result_18, &result_19]);
+        rotation.give_pair(20, [&result_20, &result_21]);
+        rotation.give_pair(22, [&result_22, &result_23]);
+        rotation.give_pair(24, [&result_24, &result_25]);
+        rotation.give(26, &result_26);
+        position.give_pair(0, [&result_27, &result_28]);
+        position.give_pair(2, [&result_29, &result_30]);
+        position.give_pair(4, [&result_31, &result_32]);
+        position.give_pair(6, [&result_33, &result_34]);
+        position.give(8, &result_35);
+        velocity.give_pair(0, [&result_36, &result_37]);
+        velocity.give_pair(2, [&result_38, &result_39]);
+        velocity.give_pair(4, [&result_40, &result_41]);
+        velocity.give_pair(6, [&result_42, &result_43]);
+        velocity.give_pair(8, [&result_44, &result_45]);
+        velocity.give_pair(10, [&result_46, &result_47]);
+        velocity.give_pair(12, [&result_48, &result_49]);
+        velocity.give_pair(14, [&result_50, &result_51]);
+        velocity.give_pair(16, [&result_52, &result_53]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`.
@@ -703,17 +790,21 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = a.get(0, l); }
-        for l in 0..LANES { given[3][l] = a.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = a.get(0, l); }
+        for l in 0..LANES { given_3[l] = a.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let a_0 = given[2][l];
-            let a_1 = given[3][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let a_0 = given_2[l];
+            let a_1 = given_3[l];
             // upper: sine and cosine, rotation
             let upper_sin = sines[0][l];
             let upper_cos = cosines[0][l];
@@ -749,10 +840,10 @@ impl DoublePendulum {
             let lower_t10 = lower_t8 - lower_t9;
             let lower_t11 = lower_f_rz - lower_t10;
             let tau_0 = upper_f_rz + lower_t11;
-            results[0][l] = tau_0;
-            results[1][l] = lower_f_rz;
+            result_0[l] = tau_0;
+            result_1[l] = lower_f_rz;
         }
-        tau.give_pair(0, [&results[0], &results[1]]);
+        tau.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`.
@@ -773,13 +864,15 @@ impl DoublePendulum {
             angles[1][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
             // upper: sine and cosine, rotation
             let upper_sin = sines[0][l];
             let upper_cos = cosines[0][l];
@@ -805,10 +898,10 @@ impl DoublePendulum {
             let lower_t5 = lower_sin * lower_minus_f_x;
             let lower_t6 = lower_f_rz - lower_t5;
             let h_0 = upper_f_rz + lower_t6;
-            results[0][l] = h_0;
-            results[1][l] = lower_f_rz;
+            result_0[l] = h_0;
+            result_1[l] = lower_f_rz;
         }
-        h.give_pair(0, [&results[0], &results[1]]);
+        h.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Jacobians `J` of frames.
@@ -827,7 +920,42 @@ impl DoublePendulum {
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 36]);
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
+        let mut result_18 = [0.0; LANES];
+        let mut result_19 = [0.0; LANES];
+        let mut result_20 = [0.0; LANES];
+        let mut result_21 = [0.0; LANES];
+        let mut result_22 = [0.0; LANES];
+        let mut result_23 = [0.0; LANES];
+        let mut result_24 = [0.0; LANES];
+        let mut result_25 = [0.0; LANES];
+        let mut result_26 = [0.0; LANES];
+        let mut result_27 = [0.0; LANES];
+        let mut result_28 = [0.0; LANES];
+        let mut result_29 = [0.0; LANES];
+        let mut result_30 = [0.0; LANES];
+        let mut result_31 = [0.0; LANES];
+        let mut result_32 = [0.0; LANES];
+        let mut result_33 = [0.0; LANES];
+        let mut result_34 = [0.0; LANES];
+        let mut result_35 = [0.0; LANES];
         for l in 0..LANES {
             // lower: sine and cosine, rotation
             let lower_sin = sines[0][l];
@@ -841,61 +969,61 @@ impl DoublePendulum {
             let upper_t2 = lower_sin * lower_t0;
             let upper_t3 = lower_sin * lower_cos;
             let jacobian_14_0 = upper_t3 - upper_t2;
-            results[0][l] = 0.0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = 0.0;
-            results[4][l] = 0.0;
-            results[5][l] = 0.0;
-            results[6][l] = 0.0;
-            results[7][l] = 0.0;
-            results[8][l] = 1.0;
-            results[9][l] = 0.0;
-            results[10][l] = 0.0;
-            results[11][l] = 0.0;
-            results[12][l] = -lower_cos;
-            results[13][l] = 0.0;
-            results[14][l] = 0.0;
-            results[15][l] = 0.0;
-            results[16][l] = -lower_sin;
-            results[17][l] = 0.0;
-            results[18][l] = 0.0;
-            results[19][l] = 0.0;
-            results[20][l] = 1.0;
-            results[21][l] = 1.0;
-            results[22][l] = 0.0;
-            results[23][l] = 0.0;
-            results[24][l] = -minus_jacobian_12_0;
-            results[25][l] = -1.0;
-            results[26][l] = 0.0;
-            results[27][l] = 0.0;
-            results[28][l] = jacobian_14_0;
-            results[29][l] = 0.0;
-            results[30][l] = 0.0;
-            results[31][l] = 0.0;
-            results[32][l] = 1.0;
-            results[33][l] = 1.0;
-            results[34][l] = 0.0;
-            results[35][l] = 0.0;
+            result_0[l] = 0.0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = 0.0;
+            result_4[l] = 0.0;
+            result_5[l] = 0.0;
+            result_6[l] = 0.0;
+            result_7[l] = 0.0;
+            result_8[l] = 1.0;
+            result_9[l] = 0.0;
+            result_10[l] = 0.0;
+            result_11[l] = 0.0;
+            result_12[l] = -lower_cos;
+            result_13[l] = 0.0;
+            result_14[l] = 0.0;
+            result_15[l] = 0.0;
+            result_16[l] = -lower_sin;
+            result_17[l] = 0.0;
+            result_18[l] = 0.0;
+            result_19[l] = 0.0;
+            result_20[l] = 1.0;
+            result_21[l] = 1.0;
+            result_22[l] = 0.0;
+            result_23[l] = 0.0;
+            result_24[l] = -minus_jacobian_12_0;
+            result_25[l] = -1.0;
+            result_26[l] = 0.0;
+            result_27[l] = 0.0;
+            result_28[l] = jacobian_14_0;
+            result_29[l] = 0.0;
+            result_30[l] = 0.0;
+            result_31[l] = 0.0;
+            result_32[l] = 1.0;
+            result_33[l] = 1.0;
+            result_34[l] = 0.0;
+            result_35[l] = 0.0;
         }
-        jacobian.give_pair(0, [&results[0], &results[1]]);
-        jacobian.give_pair(2, [&results[2], &results[3]]);
-        jacobian.give_pair(4, [&results[4], &results[5]]);
-        jacobian.give_pair(6, [&results[6], &results[7]]);
-        jacobian.give_pair(8, [&results[8], &results[9]]);
-        jacobian.give_pair(10, [&results[10], &results[11]]);
-        jacobian.give_pair(12, [&results[12], &results[13]]);
-        jacobian.give_pair(14, [&results[14], &results[15]]);
-        jacobian.give_pair(16, [&results[16], &results[17]]);
-        jacobian.give_pair(18, [&results[18], &results[19]]);
-        jacobian.give_pair(20, [&results[20], &results[21]]);
-        jacobian.give_pair(22, [&results[22], &results[23]]);
-        jacobian.give_pair(24, [&results[24], &results[25]]);
-        jacobian.give_pair(26, [&results[26], &results[27]]);
-        jacobian.give_pair(28, [&results[28], &results[29]]);
-        jacobian.give_pair(30, [&results[30], &results[31]]);
-        jacobian.give_pair(32, [&results[32], &results[33]]);
-        jacobian.give_pair(34, [&results[34], &results[35]]);
+        jacobian.give_pair(0, [&result_0, &result_1]);
+        jacobian.give_pair(2, [&result_2, &result_3]);
+        jacobian.give_pair(4, [&result_4, &result_5]);
+        jacobian.give_pair(6, [&result_6, &result_7]);
+        jacobian.give_pair(8, [&result_8, &result_9]);
+        jacobian.give_pair(10, [&result_10, &result_11]);
+        jacobian.give_pair(12, [&result_12, &result_13]);
+        jacobian.give_pair(14, [&result_14, &result_15]);
+        jacobian.give_pair(16, [&result_16, &result_17]);
+        jacobian.give_pair(18, [&result_18, &result_19]);
+        jacobian.give_pair(20, [&result_20, &result_21]);
+        jacobian.give_pair(22, [&result_22, &result_23]);
+        jacobian.give_pair(24, [&result_24, &result_25]);
+        jacobian.give_pair(26, [&result_26, &result_27]);
+        jacobian.give_pair(28, [&result_28, &result_29]);
+        jacobian.give_pair(30, [&result_30, &result_31]);
+        jacobian.give_pair(32, [&result_32, &result_33]);
+        jacobian.give_pair(34, [&result_34, &result_35]);
     }
 
     /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
@@ -915,13 +1043,31 @@ impl DoublePendulum {
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 18]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
             // lower: sine and cosine, rotation
             let lower_sin = sines[0][l];
             let lower_cos = cosines[0][l];
@@ -933,34 +1079,34 @@ impl DoublePendulum {
             // lower: acceleration
             let lower_t1 = lower_spin_z * lower_spin_z;
             let bias_2_2 = lower_minus_accel_x + lower_t1;
-            results[0][l] = 0.0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = 0.0;
-            results[4][l] = 0.0;
-            results[5][l] = 0.0;
-            results[6][l] = -lower_accel_y;
-            results[7][l] = 0.0;
-            results[8][l] = lower_minus_accel_x;
-            results[9][l] = 0.0;
-            results[10][l] = 0.0;
-            results[11][l] = 0.0;
-            results[12][l] = -lower_accel_y;
-            results[13][l] = 0.0;
-            results[14][l] = bias_2_2;
-            results[15][l] = 0.0;
-            results[16][l] = 0.0;
-            results[17][l] = 0.0;
+            result_0[l] = 0.0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = 0.0;
+            result_4[l] = 0.0;
+            result_5[l] = 0.0;
+            result_6[l] = -lower_accel_y;
+            result_7[l] = 0.0;
+            result_8[l] = lower_minus_accel_x;
+            result_9[l] = 0.0;
+            result_10[l] = 0.0;
+            result_11[l] = 0.0;
+            result_12[l] = -lower_accel_y;
+            result_13[l] = 0.0;
+            result_14[l] = bias_2_2;
+            result_15[l] = 0.0;
+            result_16[l] = 0.0;
+            result_17[l] = 0.0;
         }
-        bias.give_pair(0, [&results[0], &results[1]]);
-        bias.give_pair(2, [&results[2], &results[3]]);
-        bias.give_pair(4, [&results[4], &results[5]]);
-        bias.give_pair(6, [&results[6], &results[7]]);
-        bias.give_pair(8, [&results[8], &results[9]]);
-        bias.give_pair(10, [&results[10], &results[11]]);
-        bias.give_pair(12, [&results[12], &results[13]]);
-        bias.give_pair(14, [&results[14], &results[15]]);
-        bias.give_pair(16, [&results[16], &results[17]]);
+        bias.give_pair(0, [&result_0, &result_1]);
+        bias.give_pair(2, [&result_2, &result_3]);
+        bias.give_pair(4, [&result_4, &result_5]);
+        bias.give_pair(6, [&result_6, &result_7]);
+        bias.give_pair(8, [&result_8, &result_9]);
+        bias.give_pair(10, [&result_10, &result_11]);
+        bias.give_pair(12, [&result_12, &result_13]);
+        bias.give_pair(14, [&result_14, &result_15]);
+        bias.give_pair(16, [&result_16, &result_17]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -971,17 +1117,19 @@ impl DoublePendulum {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            results[0][l] = v_0;
-            results[1][l] = v_1;
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            result_0[l] = v_0;
+            result_1[l] = v_1;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(0, [&result_0, &result_1]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

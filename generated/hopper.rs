@@ -133,25 +133,35 @@ impl Hopper {
 
     #[inline(always)]
     fn rates_masked_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), acts: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = p.get(0, l); }
-        for l in 0..LANES { given[2][l] = p.get(1, l); }
-        for l in 0..LANES { given[3][l] = tau.get(0, l); }
-        for l in 0..LANES { given[4][l] = tau.get(1, l); }
-        for l in 0..LANES { given[5][l] = acts.get(0, l); }
-        for l in 0..LANES { given[6][l] = acts.get(3, l); }
-        for l in 0..LANES { given[7][l] = acts.get(4, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = p.get(0, l); }
+        for l in 0..LANES { given_2[l] = p.get(1, l); }
+        for l in 0..LANES { given_3[l] = tau.get(0, l); }
+        for l in 0..LANES { given_4[l] = tau.get(1, l); }
+        for l in 0..LANES { given_5[l] = acts.get(0, l); }
+        for l in 0..LANES { given_6[l] = acts.get(3, l); }
+        for l in 0..LANES { given_7[l] = acts.get(4, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let p_0 = given[1][l];
-            let p_1 = given[2][l];
-            let tau_0 = given[3][l];
-            let tau_1 = given[4][l];
-            let acts_0 = given[5][l];
-            let acts_3 = given[6][l];
-            let acts_4 = given[7][l];
+            let q_1 = given_0[l];
+            let p_0 = given_1[l];
+            let p_1 = given_2[l];
+            let tau_0 = given_3[l];
+            let tau_1 = given_4[l];
+            let acts_0 = given_5[l];
+            let acts_3 = given_6[l];
+            let acts_4 = given_7[l];
             // foot: U, Mj, k and the reduced inertia M' (4.44)
             let foot_t0 = acts_3 + 1.0;
             let foot_t1 = 4e-9 * foot_t0;
@@ -205,13 +215,13 @@ impl Hopper {
             let trunk_t1 = trunk_t0 + 9.81;
             let pd_0 = tau_0 - 11.772;
             let pd_1 = tau_1 - trunk_t1;
-            results[0][l] = foot_v;
-            results[1][l] = -trunk_minus_v;
-            results[2][l] = pd_0;
-            results[3][l] = pd_1;
+            result_0[l] = foot_v;
+            result_1[l] = -trunk_minus_v;
+            result_2[l] = pd_0;
+            result_3[l] = pd_1;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        pd.give_pair(0, [&results[2], &results[3]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        pd.give_pair(0, [&result_2, &result_3]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -223,23 +233,25 @@ impl Hopper {
 
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
             // trunk: velocity and joint rate (4.40)
             let trunk_omega_z = v_0 + v_1;
             // foot: momentum
             let foot_t0 = 0.2 * v_0;
             // trunk: momentum
             let foot_p_z = trunk_omega_z + foot_t0;
-            results[0][l] = foot_p_z;
-            results[1][l] = trunk_omega_z;
+            result_0[l] = foot_p_z;
+            result_1[l] = trunk_omega_z;
         }
-        p.give_pair(0, [&results[0], &results[1]]);
+        p.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Kinetic and potential energy, J.
@@ -253,23 +265,30 @@ impl Hopper {
 
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), acts: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), energy: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 7]);
-        for l in 0..LANES { given[0][l] = q.get(0, l); }
-        for l in 0..LANES { given[1][l] = q.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(0, l); }
-        for l in 0..LANES { given[3][l] = p.get(1, l); }
-        for l in 0..LANES { given[4][l] = acts.get(0, l); }
-        for l in 0..LANES { given[5][l] = acts.get(3, l); }
-        for l in 0..LANES { given[6][l] = acts.get(4, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(0, l); }
+        for l in 0..LANES { given_1[l] = q.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(0, l); }
+        for l in 0..LANES { given_3[l] = p.get(1, l); }
+        for l in 0..LANES { given_4[l] = acts.get(0, l); }
+        for l in 0..LANES { given_5[l] = acts.get(3, l); }
+        for l in 0..LANES { given_6[l] = acts.get(4, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let q_0 = given[0][l];
-            let q_1 = given[1][l];
-            let p_0 = given[2][l];
-            let p_1 = given[3][l];
-            let acts_0 = given[4][l];
-            let acts_3 = given[5][l];
-            let acts_4 = given[6][l];
+            let q_0 = given_0[l];
+            let q_1 = given_1[l];
+            let p_0 = given_2[l];
+            let p_1 = given_3[l];
+            let acts_0 = given_4[l];
+            let acts_3 = given_5[l];
+            let acts_4 = given_6[l];
             // trunk: inertia carried to the parent, M* (4.48)
             let trunk_minus_mp_rx_y = q_1 + 0.5;
             // foot: inertia carried to the parent, M* (4.48)
@@ -335,10 +354,10 @@ impl Hopper {
             let trunk_t2 = 200.0 * q_1;
             let trunk_t3 = q_1 * trunk_t2;
             let energy_1 = ground_t7 + trunk_t3;
-            results[0][l] = energy_0;
-            results[1][l] = energy_1;
+            result_0[l] = energy_0;
+            result_1[l] = energy_1;
         }
-        energy.give_pair(0, [&results[0], &results[1]]);
+        energy.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Residuals `φ(q)` of the constraints, rad or m, and the entries of their Jacobian `Φ(q)`.
@@ -351,42 +370,55 @@ impl Hopper {
 
     #[inline(always)]
     fn constraint_residuals_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), acts: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), residual: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), jacobian: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
-        for l in 0..LANES { given[0][l] = q.get(0, l); }
-        for l in 0..LANES { given[1][l] = q.get(1, l); }
-        for l in 0..LANES { given[2][l] = acts.get(0, l); }
-        for l in 0..LANES { given[3][l] = acts.get(3, l); }
-        for l in 0..LANES { given[4][l] = acts.get(4, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(0, l); }
+        for l in 0..LANES { given_1[l] = q.get(1, l); }
+        for l in 0..LANES { given_2[l] = acts.get(0, l); }
+        for l in 0..LANES { given_3[l] = acts.get(3, l); }
+        for l in 0..LANES { given_4[l] = acts.get(4, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
         for l in 0..LANES {
-            let q_0 = given[0][l];
-            let q_1 = given[1][l];
-            let acts_0 = given[2][l];
-            let acts_3 = given[3][l];
-            let acts_4 = given[4][l];
+            let q_0 = given_0[l];
+            let q_1 = given_1[l];
+            let acts_0 = given_2[l];
+            let acts_3 = given_3[l];
+            let acts_4 = given_4[l];
             // ground: loops and couplings
             let residual_0 = q_0 * acts_0;
             let ground_t0 = q_1 + 0.3;
             let residual_3 = acts_3 * ground_t0;
             let ground_t1 = q_1 - 0.1;
             let minus_residual_4 = acts_4 * ground_t1;
-            results[0][l] = residual_0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = residual_3;
-            results[4][l] = -minus_residual_4;
-            results[5][l] = acts_0;
-            results[6][l] = 0.0;
-            results[7][l] = 0.0;
-            results[8][l] = acts_3;
-            results[9][l] = -acts_4;
+            result_0[l] = residual_0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = residual_3;
+            result_4[l] = -minus_residual_4;
+            result_5[l] = acts_0;
+            result_6[l] = 0.0;
+            result_7[l] = 0.0;
+            result_8[l] = acts_3;
+            result_9[l] = -acts_4;
         }
-        residual.give_pair(0, [&results[0], &results[1]]);
-        residual.give_pair(2, [&results[2], &results[3]]);
-        residual.give(4, &results[4]);
-        jacobian.give_pair(0, [&results[5], &results[6]]);
-        jacobian.give_pair(2, [&results[7], &results[8]]);
-        jacobian.give(4, &results[9]);
+        residual.give_pair(0, [&result_0, &result_1]);
+        residual.give_pair(2, [&result_2, &result_3]);
+        residual.give(4, &result_4);
+        jacobian.give_pair(0, [&result_5, &result_6]);
+        jacobian.give_pair(2, [&result_7, &result_8]);
+        jacobian.give(4, &result_9);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -414,19 +446,31 @@ impl Hopper {
 
     #[inline(always)]
     fn project_momenta_masked_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), acts: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), freed: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), sigma: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = acts.get(0, l); }
-        for l in 0..LANES { given[3][l] = acts.get(3, l); }
-        for l in 0..LANES { given[4][l] = acts.get(4, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = acts.get(0, l); }
+        for l in 0..LANES { given_3[l] = acts.get(3, l); }
+        for l in 0..LANES { given_4[l] = acts.get(4, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
-            let acts_0 = given[2][l];
-            let acts_3 = given[3][l];
-            let acts_4 = given[4][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
+            let acts_0 = given_2[l];
+            let acts_3 = given_3[l];
+            let acts_4 = given_4[l];
             // foot: U, Mj, k and the reduced inertia M' (4.44)
             let foot_t0 = acts_3 + 1.0;
             let foot_t1 = 4e-9 * foot_t0;
@@ -480,21 +524,21 @@ impl Hopper {
             let freed_1 = trunk_t0 - minus_sigma_4;
             // foot: loops and couplings
             let freed_0 = p_0 - sigma_0;
-            results[0][l] = foot_v;
-            results[1][l] = -trunk_minus_v;
-            results[2][l] = freed_0;
-            results[3][l] = freed_1;
-            results[4][l] = sigma_0;
-            results[5][l] = 0.0;
-            results[6][l] = 0.0;
-            results[7][l] = sigma_3;
-            results[8][l] = -minus_sigma_4;
+            result_0[l] = foot_v;
+            result_1[l] = -trunk_minus_v;
+            result_2[l] = freed_0;
+            result_3[l] = freed_1;
+            result_4[l] = sigma_0;
+            result_5[l] = 0.0;
+            result_6[l] = 0.0;
+            result_7[l] = sigma_3;
+            result_8[l] = -minus_sigma_4;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        freed.give_pair(0, [&results[2], &results[3]]);
-        sigma.give_pair(0, [&results[4], &results[5]]);
-        sigma.give_pair(2, [&results[6], &results[7]]);
-        sigma.give(4, &results[8]);
+        v.give_pair(0, [&result_0, &result_1]);
+        freed.give_pair(0, [&result_2, &result_3]);
+        sigma.give_pair(0, [&result_4, &result_5]);
+        sigma.give_pair(2, [&result_6, &result_7]);
+        sigma.give(4, &result_8);
     }
 
     /// Residuals `φ(q)` of the constraints, Newton's step onto the closed positions, and its pivots. The step is `δq =
@@ -507,19 +551,34 @@ impl Hopper {
 
     #[inline(always)]
     fn position_correction_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), acts: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), residual: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), dq: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pivots: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
-        for l in 0..LANES { given[0][l] = q.get(0, l); }
-        for l in 0..LANES { given[1][l] = q.get(1, l); }
-        for l in 0..LANES { given[2][l] = acts.get(0, l); }
-        for l in 0..LANES { given[3][l] = acts.get(3, l); }
-        for l in 0..LANES { given[4][l] = acts.get(4, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(0, l); }
+        for l in 0..LANES { given_1[l] = q.get(1, l); }
+        for l in 0..LANES { given_2[l] = acts.get(0, l); }
+        for l in 0..LANES { given_3[l] = acts.get(3, l); }
+        for l in 0..LANES { given_4[l] = acts.get(4, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
         for l in 0..LANES {
-            let q_0 = given[0][l];
-            let q_1 = given[1][l];
-            let acts_0 = given[2][l];
-            let acts_3 = given[3][l];
-            let acts_4 = given[4][l];
+            let q_0 = given_0[l];
+            let q_1 = given_1[l];
+            let acts_0 = given_2[l];
+            let acts_3 = given_3[l];
+            let acts_4 = given_4[l];
             // ground: loops and couplings
             let residual_0 = q_0 * acts_0;
             let ground_t0 = q_1 + 0.3;
@@ -576,26 +635,26 @@ impl Hopper {
             // trunk: loops and couplings
             let trunk_t0 = foot_rho * ground_t8;
             let pivots_0 = foot_rho * trunk_t0;
-            results[0][l] = residual_0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = residual_3;
-            results[4][l] = -minus_residual_4;
-            results[5][l] = foot_dq;
-            results[6][l] = -trunk_minus_dq;
-            results[7][l] = pivots_0;
-            results[8][l] = 0.0;
-            results[9][l] = 0.0;
-            results[10][l] = pivots_3;
-            results[11][l] = pivots_4;
+            result_0[l] = residual_0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = residual_3;
+            result_4[l] = -minus_residual_4;
+            result_5[l] = foot_dq;
+            result_6[l] = -trunk_minus_dq;
+            result_7[l] = pivots_0;
+            result_8[l] = 0.0;
+            result_9[l] = 0.0;
+            result_10[l] = pivots_3;
+            result_11[l] = pivots_4;
         }
-        residual.give_pair(0, [&results[0], &results[1]]);
-        residual.give_pair(2, [&results[2], &results[3]]);
-        residual.give(4, &results[4]);
-        dq.give_pair(0, [&results[5], &results[6]]);
-        pivots.give_pair(0, [&results[7], &results[8]]);
-        pivots.give_pair(2, [&results[9], &results[10]]);
-        pivots.give(4, &results[11]);
+        residual.give_pair(0, [&result_0, &result_1]);
+        residual.give_pair(2, [&result_2, &result_3]);
+        residual.give(4, &result_4);
+        dq.give_pair(0, [&result_5, &result_6]);
+        pivots.give_pair(0, [&result_7, &result_8]);
+        pivots.give_pair(2, [&result_9, &result_10]);
+        pivots.give(4, &result_11);
     }
 
     /// Multipliers `λ` of the constraints, N and N m.
@@ -625,21 +684,30 @@ impl Hopper {
 
     #[inline(always)]
     fn multipliers_masked_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), acts: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), lambda: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = tau.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(1, l); }
-        for l in 0..LANES { given[3][l] = acts.get(0, l); }
-        for l in 0..LANES { given[4][l] = acts.get(3, l); }
-        for l in 0..LANES { given[5][l] = acts.get(4, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = tau.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(1, l); }
+        for l in 0..LANES { given_3[l] = acts.get(0, l); }
+        for l in 0..LANES { given_4[l] = acts.get(3, l); }
+        for l in 0..LANES { given_5[l] = acts.get(4, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let tau_0 = given[1][l];
-            let tau_1 = given[2][l];
-            let acts_0 = given[3][l];
-            let acts_3 = given[4][l];
-            let acts_4 = given[5][l];
+            let q_1 = given_0[l];
+            let tau_0 = given_1[l];
+            let tau_1 = given_2[l];
+            let acts_0 = given_3[l];
+            let acts_3 = given_4[l];
+            let acts_4 = given_5[l];
             // foot: U, Mj, k and the reduced inertia M' (4.44)
             let foot_t0 = acts_3 + 1.0;
             let foot_t1 = 4e-9 * foot_t0;
@@ -689,15 +757,15 @@ impl Hopper {
             let foot_t26 = foot_t16 - foot_t25;
             let foot_t27 = foot_t5 * minus_lambda_4;
             let lambda_3 = foot_t26 - foot_t27;
-            results[0][l] = lambda_0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = lambda_3;
-            results[4][l] = -minus_lambda_4;
+            result_0[l] = lambda_0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = lambda_3;
+            result_4[l] = -minus_lambda_4;
         }
-        lambda.give_pair(0, [&results[0], &results[1]]);
-        lambda.give_pair(2, [&results[2], &results[3]]);
-        lambda.give(4, &results[4]);
+        lambda.give_pair(0, [&result_0, &result_1]);
+        lambda.give_pair(2, [&result_2, &result_3]);
+        lambda.give(4, &result_4);
     }
 
     /// Gaps of the contacts: residuals of all rows, their velocities `Φ v`, and the entries of `Φ`, whatever acts.
@@ -711,45 +779,62 @@ impl Hopper {
 
     #[inline(always)]
     fn gaps_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), gaps: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), velocities: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), jacobian: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = q.get(0, l); }
-        for l in 0..LANES { given[1][l] = q.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(0, l); }
-        for l in 0..LANES { given[3][l] = v.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 15]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(0, l); }
+        for l in 0..LANES { given_1[l] = q.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(0, l); }
+        for l in 0..LANES { given_3[l] = v.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
         for l in 0..LANES {
-            let q_0 = given[0][l];
-            let q_1 = given[1][l];
-            let v_0 = given[2][l];
-            let v_1 = given[3][l];
+            let q_0 = given_0[l];
+            let q_1 = given_1[l];
+            let v_0 = given_2[l];
+            let v_1 = given_3[l];
             // ground: loops and couplings
             let gaps_3 = q_1 + 0.3;
             let gaps_4 = 0.1 - q_1;
-            results[0][l] = q_0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = gaps_3;
-            results[4][l] = gaps_4;
-            results[5][l] = v_0;
-            results[6][l] = 0.0;
-            results[7][l] = 0.0;
-            results[8][l] = v_1;
-            results[9][l] = -v_1;
-            results[10][l] = 1.0;
-            results[11][l] = 0.0;
-            results[12][l] = 0.0;
-            results[13][l] = 1.0;
-            results[14][l] = -1.0;
+            result_0[l] = q_0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = gaps_3;
+            result_4[l] = gaps_4;
+            result_5[l] = v_0;
+            result_6[l] = 0.0;
+            result_7[l] = 0.0;
+            result_8[l] = v_1;
+            result_9[l] = -v_1;
+            result_10[l] = 1.0;
+            result_11[l] = 0.0;
+            result_12[l] = 0.0;
+            result_13[l] = 1.0;
+            result_14[l] = -1.0;
         }
-        gaps.give_pair(0, [&results[0], &results[1]]);
-        gaps.give_pair(2, [&results[2], &results[3]]);
-        gaps.give(4, &results[4]);
-        velocities.give_pair(0, [&results[5], &results[6]]);
-        velocities.give_pair(2, [&results[7], &results[8]]);
-        velocities.give(4, &results[9]);
-        jacobian.give_pair(0, [&results[10], &results[11]]);
-        jacobian.give_pair(2, [&results[12], &results[13]]);
-        jacobian.give(4, &results[14]);
+        gaps.give_pair(0, [&result_0, &result_1]);
+        gaps.give_pair(2, [&result_2, &result_3]);
+        gaps.give(4, &result_4);
+        velocities.give_pair(0, [&result_5, &result_6]);
+        velocities.give_pair(2, [&result_7, &result_8]);
+        velocities.give(4, &result_9);
+        jacobian.give_pair(0, [&result_10, &result_11]);
+        jacobian.give_pair(2, [&result_12, &result_13]);
+        jacobian.give(4, &result_14);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -760,17 +845,19 @@ impl Hopper {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            results[0][l] = v_0;
-            results[1][l] = v_1;
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            result_0[l] = v_0;
+            result_1[l] = v_1;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
+        qd.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
@@ -782,19 +869,26 @@ impl Hopper {
 
     #[inline(always)]
     fn rates_in_0_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = p.get(0, l); }
-        for l in 0..LANES { given[2][l] = p.get(1, l); }
-        for l in 0..LANES { given[3][l] = tau.get(0, l); }
-        for l in 0..LANES { given[4][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = p.get(0, l); }
+        for l in 0..LANES { given_2[l] = p.get(1, l); }
+        for l in 0..LANES { given_3[l] = tau.get(0, l); }
+        for l in 0..LANES { given_4[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let p_0 = given[1][l];
-            let p_1 = given[2][l];
-            let tau_0 = given[3][l];
-            let tau_1 = given[4][l];
+            let q_1 = given_0[l];
+            let p_0 = given_1[l];
+            let p_1 = given_2[l];
+            let tau_0 = given_3[l];
+            let tau_1 = given_4[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_t0 = p_0 - p_1;
             let foot_e = 5.000000000000001 * foot_t0;
@@ -805,13 +899,13 @@ impl Hopper {
             let trunk_t1 = trunk_t0 + 9.81;
             let pd_0 = tau_0 - 11.772;
             let pd_1 = tau_1 - trunk_t1;
-            results[0][l] = foot_e;
-            results[1][l] = trunk_v;
-            results[2][l] = pd_0;
-            results[3][l] = pd_1;
+            result_0[l] = foot_e;
+            result_1[l] = trunk_v;
+            result_2[l] = pd_0;
+            result_3[l] = pd_1;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        pd.give_pair(0, [&results[2], &results[3]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        pd.give_pair(0, [&result_2, &result_3]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -823,33 +917,42 @@ impl Hopper {
 
     #[inline(always)]
     fn project_momenta_in_0_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), freed: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), sigma: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_t0 = p_0 - p_1;
             let foot_e = 5.000000000000001 * foot_t0;
             // foot: velocity and joint rate (4.40)
             let trunk_v = p_1 - foot_e;
-            results[0][l] = foot_e;
-            results[1][l] = trunk_v;
-            results[2][l] = p_0;
-            results[3][l] = p_1;
-            results[4][l] = 0.0;
-            results[5][l] = 0.0;
-            results[6][l] = 0.0;
-            results[7][l] = 0.0;
-            results[8][l] = 0.0;
+            result_0[l] = foot_e;
+            result_1[l] = trunk_v;
+            result_2[l] = p_0;
+            result_3[l] = p_1;
+            result_4[l] = 0.0;
+            result_5[l] = 0.0;
+            result_6[l] = 0.0;
+            result_7[l] = 0.0;
+            result_8[l] = 0.0;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        freed.give_pair(0, [&results[2], &results[3]]);
-        sigma.give_pair(0, [&results[4], &results[5]]);
-        sigma.give_pair(2, [&results[6], &results[7]]);
-        sigma.give(4, &results[8]);
+        v.give_pair(0, [&result_0, &result_1]);
+        freed.give_pair(0, [&result_2, &result_3]);
+        sigma.give_pair(0, [&result_4, &result_5]);
+        sigma.give_pair(2, [&result_6, &result_7]);
+        sigma.give(4, &result_8);
     }
 
     /// Multipliers `λ` of the constraints, N and N m.
@@ -861,17 +964,21 @@ impl Hopper {
 
     #[inline(always)]
     fn multipliers_in_0_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(lambda: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
         for l in 0..LANES {
-            results[0][l] = 0.0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = 0.0;
-            results[4][l] = 0.0;
+            result_0[l] = 0.0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = 0.0;
+            result_4[l] = 0.0;
         }
-        lambda.give_pair(0, [&results[0], &results[1]]);
-        lambda.give_pair(2, [&results[2], &results[3]]);
-        lambda.give(4, &results[4]);
+        lambda.give_pair(0, [&result_0, &result_1]);
+        lambda.give_pair(2, [&result_2, &result_3]);
+        lambda.give(4, &result_4);
     }
 
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
@@ -883,17 +990,23 @@ impl Hopper {
 
     #[inline(always)]
     fn rates_in_1_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = p.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(0, l); }
-        for l in 0..LANES { given[3][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = p.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(0, l); }
+        for l in 0..LANES { given_3[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let p_0 = given[1][l];
-            let tau_0 = given[2][l];
-            let tau_1 = given[3][l];
+            let q_1 = given_0[l];
+            let p_0 = given_1[l];
+            let tau_0 = given_2[l];
+            let tau_1 = given_3[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_e = 0.8333333333333334 * p_0;
             // trunk: momentum rate (4.36)
@@ -901,13 +1014,13 @@ impl Hopper {
             let trunk_t1 = trunk_t0 + 9.81;
             let pd_0 = tau_0 - 11.772;
             let pd_1 = tau_1 - trunk_t1;
-            results[0][l] = foot_e;
-            results[1][l] = 0.0;
-            results[2][l] = pd_0;
-            results[3][l] = pd_1;
+            result_0[l] = foot_e;
+            result_1[l] = 0.0;
+            result_2[l] = pd_0;
+            result_3[l] = pd_1;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        pd.give_pair(0, [&results[2], &results[3]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        pd.give_pair(0, [&result_2, &result_3]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -919,34 +1032,43 @@ impl Hopper {
 
     #[inline(always)]
     fn project_momenta_in_1_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), freed: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), sigma: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_e = 0.8333333333333334 * p_0;
             // foot: velocity and joint rate (4.40)
             let minus_sigma_4 = p_1 - foot_e;
             // trunk: loops and couplings
             let freed_1 = p_1 - minus_sigma_4;
-            results[0][l] = foot_e;
-            results[1][l] = 0.0;
-            results[2][l] = p_0;
-            results[3][l] = freed_1;
-            results[4][l] = 0.0;
-            results[5][l] = 0.0;
-            results[6][l] = 0.0;
-            results[7][l] = 0.0;
-            results[8][l] = -minus_sigma_4;
+            result_0[l] = foot_e;
+            result_1[l] = 0.0;
+            result_2[l] = p_0;
+            result_3[l] = freed_1;
+            result_4[l] = 0.0;
+            result_5[l] = 0.0;
+            result_6[l] = 0.0;
+            result_7[l] = 0.0;
+            result_8[l] = -minus_sigma_4;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        freed.give_pair(0, [&results[2], &results[3]]);
-        sigma.give_pair(0, [&results[4], &results[5]]);
-        sigma.give_pair(2, [&results[6], &results[7]]);
-        sigma.give(4, &results[8]);
+        v.give_pair(0, [&result_0, &result_1]);
+        freed.give_pair(0, [&result_2, &result_3]);
+        sigma.give_pair(0, [&result_4, &result_5]);
+        sigma.give_pair(2, [&result_6, &result_7]);
+        sigma.give(4, &result_8);
     }
 
     /// Multipliers `λ` of the constraints, N and N m.
@@ -959,15 +1081,21 @@ impl Hopper {
 
     #[inline(always)]
     fn multipliers_in_1_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), lambda: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 3]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = tau.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = tau.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let tau_0 = given[1][l];
-            let tau_1 = given[2][l];
+            let q_1 = given_0[l];
+            let tau_0 = given_1[l];
+            let tau_1 = given_2[l];
             // trunk: gravity and wrenches
             let trunk_t0 = 400.0 * q_1;
             let trunk_t1 = tau_1 - trunk_t0;
@@ -975,15 +1103,15 @@ impl Hopper {
             let foot_e = 0.8333333333333334 * tau_0;
             // foot: acceleration
             let lambda_4 = foot_e - trunk_t1;
-            results[0][l] = 0.0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = 0.0;
-            results[4][l] = lambda_4;
+            result_0[l] = 0.0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = 0.0;
+            result_4[l] = lambda_4;
         }
-        lambda.give_pair(0, [&results[0], &results[1]]);
-        lambda.give_pair(2, [&results[2], &results[3]]);
-        lambda.give(4, &results[4]);
+        lambda.give_pair(0, [&result_0, &result_1]);
+        lambda.give_pair(2, [&result_2, &result_3]);
+        lambda.give(4, &result_4);
     }
 
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
@@ -995,17 +1123,23 @@ impl Hopper {
 
     #[inline(always)]
     fn rates_in_2_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = p.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(0, l); }
-        for l in 0..LANES { given[3][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = p.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(0, l); }
+        for l in 0..LANES { given_3[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let p_0 = given[1][l];
-            let tau_0 = given[2][l];
-            let tau_1 = given[3][l];
+            let q_1 = given_0[l];
+            let p_0 = given_1[l];
+            let tau_0 = given_2[l];
+            let tau_1 = given_3[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_e = 0.8333333333333334 * p_0;
             // trunk: momentum rate (4.36)
@@ -1013,13 +1147,13 @@ impl Hopper {
             let trunk_t1 = trunk_t0 + 9.81;
             let pd_0 = tau_0 - 11.772;
             let pd_1 = tau_1 - trunk_t1;
-            results[0][l] = foot_e;
-            results[1][l] = 0.0;
-            results[2][l] = pd_0;
-            results[3][l] = pd_1;
+            result_0[l] = foot_e;
+            result_1[l] = 0.0;
+            result_2[l] = pd_0;
+            result_3[l] = pd_1;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        pd.give_pair(0, [&results[2], &results[3]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        pd.give_pair(0, [&result_2, &result_3]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -1031,34 +1165,43 @@ impl Hopper {
 
     #[inline(always)]
     fn project_momenta_in_2_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), freed: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), sigma: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_e = 0.8333333333333334 * p_0;
             // foot: velocity and joint rate (4.40)
             let sigma_3 = p_1 - foot_e;
             // trunk: loops and couplings
             let freed_1 = p_1 - sigma_3;
-            results[0][l] = foot_e;
-            results[1][l] = 0.0;
-            results[2][l] = p_0;
-            results[3][l] = freed_1;
-            results[4][l] = 0.0;
-            results[5][l] = 0.0;
-            results[6][l] = 0.0;
-            results[7][l] = sigma_3;
-            results[8][l] = 0.0;
+            result_0[l] = foot_e;
+            result_1[l] = 0.0;
+            result_2[l] = p_0;
+            result_3[l] = freed_1;
+            result_4[l] = 0.0;
+            result_5[l] = 0.0;
+            result_6[l] = 0.0;
+            result_7[l] = sigma_3;
+            result_8[l] = 0.0;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        freed.give_pair(0, [&results[2], &results[3]]);
-        sigma.give_pair(0, [&results[4], &results[5]]);
-        sigma.give_pair(2, [&results[6], &results[7]]);
-        sigma.give(4, &results[8]);
+        v.give_pair(0, [&result_0, &result_1]);
+        freed.give_pair(0, [&result_2, &result_3]);
+        sigma.give_pair(0, [&result_4, &result_5]);
+        sigma.give_pair(2, [&result_6, &result_7]);
+        sigma.give(4, &result_8);
     }
 
     /// Multipliers `λ` of the constraints, N and N m.
@@ -1071,15 +1214,21 @@ impl Hopper {
 
     #[inline(always)]
     fn multipliers_in_2_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), lambda: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 3]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = tau.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = tau.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let tau_0 = given[1][l];
-            let tau_1 = given[2][l];
+            let q_1 = given_0[l];
+            let tau_0 = given_1[l];
+            let tau_1 = given_2[l];
             // trunk: gravity and wrenches
             let trunk_t0 = 400.0 * q_1;
             let trunk_t1 = tau_1 - trunk_t0;
@@ -1087,15 +1236,15 @@ impl Hopper {
             let foot_e = 0.8333333333333334 * tau_0;
             // foot: acceleration
             let lambda_3 = trunk_t1 - foot_e;
-            results[0][l] = 0.0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = lambda_3;
-            results[4][l] = 0.0;
+            result_0[l] = 0.0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = lambda_3;
+            result_4[l] = 0.0;
         }
-        lambda.give_pair(0, [&results[0], &results[1]]);
-        lambda.give_pair(2, [&results[2], &results[3]]);
-        lambda.give(4, &results[4]);
+        lambda.give_pair(0, [&result_0, &result_1]);
+        lambda.give_pair(2, [&result_2, &result_3]);
+        lambda.give(4, &result_4);
     }
 
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
@@ -1107,19 +1256,26 @@ impl Hopper {
 
     #[inline(always)]
     fn rates_in_3_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = p.get(0, l); }
-        for l in 0..LANES { given[2][l] = p.get(1, l); }
-        for l in 0..LANES { given[3][l] = tau.get(0, l); }
-        for l in 0..LANES { given[4][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = p.get(0, l); }
+        for l in 0..LANES { given_2[l] = p.get(1, l); }
+        for l in 0..LANES { given_3[l] = tau.get(0, l); }
+        for l in 0..LANES { given_4[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let p_0 = given[1][l];
-            let p_1 = given[2][l];
-            let tau_0 = given[3][l];
-            let tau_1 = given[4][l];
+            let q_1 = given_0[l];
+            let p_0 = given_1[l];
+            let p_1 = given_2[l];
+            let tau_0 = given_3[l];
+            let tau_1 = given_4[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_t0 = p_0 - p_1;
             let foot_e = 5.000000000000001 * foot_t0;
@@ -1133,13 +1289,13 @@ impl Hopper {
             let trunk_t1 = trunk_t0 + 9.81;
             let pd_0 = tau_0 - 11.772;
             let pd_1 = tau_1 - trunk_t1;
-            results[0][l] = foot_v;
-            results[1][l] = trunk_v;
-            results[2][l] = pd_0;
-            results[3][l] = pd_1;
+            result_0[l] = foot_v;
+            result_1[l] = trunk_v;
+            result_2[l] = pd_0;
+            result_3[l] = pd_1;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        pd.give_pair(0, [&results[2], &results[3]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        pd.give_pair(0, [&result_2, &result_3]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -1151,13 +1307,22 @@ impl Hopper {
 
     #[inline(always)]
     fn project_momenta_in_3_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), freed: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), sigma: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_t0 = p_0 - p_1;
             let foot_e = 5.000000000000001 * foot_t0;
@@ -1168,21 +1333,21 @@ impl Hopper {
             let trunk_v = p_1 - foot_v;
             // foot: loops and couplings
             let freed_0 = p_0 - sigma_0;
-            results[0][l] = foot_v;
-            results[1][l] = trunk_v;
-            results[2][l] = freed_0;
-            results[3][l] = p_1;
-            results[4][l] = sigma_0;
-            results[5][l] = 0.0;
-            results[6][l] = 0.0;
-            results[7][l] = 0.0;
-            results[8][l] = 0.0;
+            result_0[l] = foot_v;
+            result_1[l] = trunk_v;
+            result_2[l] = freed_0;
+            result_3[l] = p_1;
+            result_4[l] = sigma_0;
+            result_5[l] = 0.0;
+            result_6[l] = 0.0;
+            result_7[l] = 0.0;
+            result_8[l] = 0.0;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        freed.give_pair(0, [&results[2], &results[3]]);
-        sigma.give_pair(0, [&results[4], &results[5]]);
-        sigma.give_pair(2, [&results[6], &results[7]]);
-        sigma.give(4, &results[8]);
+        v.give_pair(0, [&result_0, &result_1]);
+        freed.give_pair(0, [&result_2, &result_3]);
+        sigma.give_pair(0, [&result_4, &result_5]);
+        sigma.give_pair(2, [&result_6, &result_7]);
+        sigma.give(4, &result_8);
     }
 
     /// Multipliers `λ` of the constraints, N and N m.
@@ -1195,15 +1360,21 @@ impl Hopper {
 
     #[inline(always)]
     fn multipliers_in_3_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), lambda: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 3]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = tau.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = tau.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let tau_0 = given[1][l];
-            let tau_1 = given[2][l];
+            let q_1 = given_0[l];
+            let tau_0 = given_1[l];
+            let tau_1 = given_2[l];
             // trunk: gravity and wrenches
             let trunk_t0 = 400.0 * q_1;
             let trunk_t1 = tau_1 - trunk_t0;
@@ -1212,15 +1383,15 @@ impl Hopper {
             let foot_e = 5.000000000000001 * foot_t0;
             let foot_t1 = foot_e - 9.81;
             let lambda_0 = 0.19999999999999996 * foot_t1;
-            results[0][l] = lambda_0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = 0.0;
-            results[4][l] = 0.0;
+            result_0[l] = lambda_0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = 0.0;
+            result_4[l] = 0.0;
         }
-        lambda.give_pair(0, [&results[0], &results[1]]);
-        lambda.give_pair(2, [&results[2], &results[3]]);
-        lambda.give(4, &results[4]);
+        lambda.give_pair(0, [&result_0, &result_1]);
+        lambda.give_pair(2, [&result_2, &result_3]);
+        lambda.give(4, &result_4);
     }
 
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
@@ -1232,17 +1403,23 @@ impl Hopper {
 
     #[inline(always)]
     fn rates_in_4_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = p.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(0, l); }
-        for l in 0..LANES { given[3][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = p.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(0, l); }
+        for l in 0..LANES { given_3[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let p_0 = given[1][l];
-            let tau_0 = given[2][l];
-            let tau_1 = given[3][l];
+            let q_1 = given_0[l];
+            let p_0 = given_1[l];
+            let tau_0 = given_2[l];
+            let tau_1 = given_3[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_e = 0.8333333333333334 * p_0;
             // trunk: momentum rate (4.36)
@@ -1250,13 +1427,13 @@ impl Hopper {
             let trunk_t1 = trunk_t0 + 9.81;
             let pd_0 = tau_0 - 11.772;
             let pd_1 = tau_1 - trunk_t1;
-            results[0][l] = foot_e;
-            results[1][l] = 0.0;
-            results[2][l] = pd_0;
-            results[3][l] = pd_1;
+            result_0[l] = foot_e;
+            result_1[l] = 0.0;
+            result_2[l] = pd_0;
+            result_3[l] = pd_1;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        pd.give_pair(0, [&results[2], &results[3]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        pd.give_pair(0, [&result_2, &result_3]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -1268,34 +1445,43 @@ impl Hopper {
 
     #[inline(always)]
     fn project_momenta_in_4_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), freed: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), sigma: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_e = 0.8333333333333334 * p_0;
             // foot: velocity and joint rate (4.40)
             let sigma_3 = p_1 - foot_e;
             // trunk: loops and couplings
             let freed_1 = p_1 - sigma_3;
-            results[0][l] = foot_e;
-            results[1][l] = 0.0;
-            results[2][l] = p_0;
-            results[3][l] = freed_1;
-            results[4][l] = 0.0;
-            results[5][l] = 0.0;
-            results[6][l] = 0.0;
-            results[7][l] = sigma_3;
-            results[8][l] = 0.0;
+            result_0[l] = foot_e;
+            result_1[l] = 0.0;
+            result_2[l] = p_0;
+            result_3[l] = freed_1;
+            result_4[l] = 0.0;
+            result_5[l] = 0.0;
+            result_6[l] = 0.0;
+            result_7[l] = sigma_3;
+            result_8[l] = 0.0;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        freed.give_pair(0, [&results[2], &results[3]]);
-        sigma.give_pair(0, [&results[4], &results[5]]);
-        sigma.give_pair(2, [&results[6], &results[7]]);
-        sigma.give(4, &results[8]);
+        v.give_pair(0, [&result_0, &result_1]);
+        freed.give_pair(0, [&result_2, &result_3]);
+        sigma.give_pair(0, [&result_4, &result_5]);
+        sigma.give_pair(2, [&result_6, &result_7]);
+        sigma.give(4, &result_8);
     }
 
     /// Multipliers `λ` of the constraints, N and N m.
@@ -1308,15 +1494,21 @@ impl Hopper {
 
     #[inline(always)]
     fn multipliers_in_4_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), lambda: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 3]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = tau.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = tau.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let tau_0 = given[1][l];
-            let tau_1 = given[2][l];
+            let q_1 = given_0[l];
+            let tau_0 = given_1[l];
+            let tau_1 = given_2[l];
             // trunk: gravity and wrenches
             let trunk_t0 = 400.0 * q_1;
             let trunk_t1 = tau_1 - trunk_t0;
@@ -1324,15 +1516,15 @@ impl Hopper {
             let foot_e = 0.8333333333333334 * tau_0;
             // foot: acceleration
             let lambda_3 = trunk_t1 - foot_e;
-            results[0][l] = 0.0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = lambda_3;
-            results[4][l] = 0.0;
+            result_0[l] = 0.0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = lambda_3;
+            result_4[l] = 0.0;
         }
-        lambda.give_pair(0, [&results[0], &results[1]]);
-        lambda.give_pair(2, [&results[2], &results[3]]);
-        lambda.give(4, &results[4]);
+        lambda.give_pair(0, [&result_0, &result_1]);
+        lambda.give_pair(2, [&result_2, &result_3]);
+        lambda.give(4, &result_4);
     }
 
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
@@ -1344,17 +1536,23 @@ impl Hopper {
 
     #[inline(always)]
     fn rates_in_5_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = p.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(0, l); }
-        for l in 0..LANES { given[3][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = p.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(0, l); }
+        for l in 0..LANES { given_3[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let p_0 = given[1][l];
-            let tau_0 = given[2][l];
-            let tau_1 = given[3][l];
+            let q_1 = given_0[l];
+            let p_0 = given_1[l];
+            let tau_0 = given_2[l];
+            let tau_1 = given_3[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_e = 0.8333333333333334 * p_0;
             let foot_t0 = 1.2 * foot_e;
@@ -1366,13 +1564,13 @@ impl Hopper {
             let trunk_t1 = trunk_t0 + 9.81;
             let pd_0 = tau_0 - 11.772;
             let pd_1 = tau_1 - trunk_t1;
-            results[0][l] = foot_v;
-            results[1][l] = 0.0;
-            results[2][l] = pd_0;
-            results[3][l] = pd_1;
+            result_0[l] = foot_v;
+            result_1[l] = 0.0;
+            result_2[l] = pd_0;
+            result_3[l] = pd_1;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        pd.give_pair(0, [&results[2], &results[3]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        pd.give_pair(0, [&result_2, &result_3]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -1384,13 +1582,22 @@ impl Hopper {
 
     #[inline(always)]
     fn project_momenta_in_5_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), freed: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), sigma: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_e = 0.8333333333333334 * p_0;
             let sigma_0 = 1.2 * foot_e;
@@ -1402,21 +1609,21 @@ impl Hopper {
             let freed_1 = p_1 - minus_sigma_4;
             // foot: loops and couplings
             let freed_0 = p_0 - sigma_0;
-            results[0][l] = foot_v;
-            results[1][l] = 0.0;
-            results[2][l] = freed_0;
-            results[3][l] = freed_1;
-            results[4][l] = sigma_0;
-            results[5][l] = 0.0;
-            results[6][l] = 0.0;
-            results[7][l] = 0.0;
-            results[8][l] = -minus_sigma_4;
+            result_0[l] = foot_v;
+            result_1[l] = 0.0;
+            result_2[l] = freed_0;
+            result_3[l] = freed_1;
+            result_4[l] = sigma_0;
+            result_5[l] = 0.0;
+            result_6[l] = 0.0;
+            result_7[l] = 0.0;
+            result_8[l] = -minus_sigma_4;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        freed.give_pair(0, [&results[2], &results[3]]);
-        sigma.give_pair(0, [&results[4], &results[5]]);
-        sigma.give_pair(2, [&results[6], &results[7]]);
-        sigma.give(4, &results[8]);
+        v.give_pair(0, [&result_0, &result_1]);
+        freed.give_pair(0, [&result_2, &result_3]);
+        sigma.give_pair(0, [&result_4, &result_5]);
+        sigma.give_pair(2, [&result_6, &result_7]);
+        sigma.give(4, &result_8);
     }
 
     /// Multipliers `λ` of the constraints, N and N m.
@@ -1429,15 +1636,21 @@ impl Hopper {
 
     #[inline(always)]
     fn multipliers_in_5_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), lambda: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 3]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = tau.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = tau.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let tau_0 = given[1][l];
-            let tau_1 = given[2][l];
+            let q_1 = given_0[l];
+            let tau_0 = given_1[l];
+            let tau_1 = given_2[l];
             // trunk: gravity and wrenches
             let trunk_t0 = 400.0 * q_1;
             let trunk_t1 = tau_1 - trunk_t0;
@@ -1449,15 +1662,15 @@ impl Hopper {
             let foot_t1 = 0.8333333333333334 * lambda_0;
             let foot_a = foot_e - foot_t1;
             let lambda_4 = foot_a - trunk_t1;
-            results[0][l] = lambda_0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = 0.0;
-            results[4][l] = lambda_4;
+            result_0[l] = lambda_0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = 0.0;
+            result_4[l] = lambda_4;
         }
-        lambda.give_pair(0, [&results[0], &results[1]]);
-        lambda.give_pair(2, [&results[2], &results[3]]);
-        lambda.give(4, &results[4]);
+        lambda.give_pair(0, [&result_0, &result_1]);
+        lambda.give_pair(2, [&result_2, &result_3]);
+        lambda.give(4, &result_4);
     }
 
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
@@ -1469,17 +1682,23 @@ impl Hopper {
 
     #[inline(always)]
     fn rates_in_6_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = p.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(0, l); }
-        for l in 0..LANES { given[3][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = p.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(0, l); }
+        for l in 0..LANES { given_3[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let p_0 = given[1][l];
-            let tau_0 = given[2][l];
-            let tau_1 = given[3][l];
+            let q_1 = given_0[l];
+            let p_0 = given_1[l];
+            let tau_0 = given_2[l];
+            let tau_1 = given_3[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_e = 0.8333333333333334 * p_0;
             let foot_t0 = 1.2 * foot_e;
@@ -1491,13 +1710,13 @@ impl Hopper {
             let trunk_t1 = trunk_t0 + 9.81;
             let pd_0 = tau_0 - 11.772;
             let pd_1 = tau_1 - trunk_t1;
-            results[0][l] = foot_v;
-            results[1][l] = 0.0;
-            results[2][l] = pd_0;
-            results[3][l] = pd_1;
+            result_0[l] = foot_v;
+            result_1[l] = 0.0;
+            result_2[l] = pd_0;
+            result_3[l] = pd_1;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        pd.give_pair(0, [&results[2], &results[3]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        pd.give_pair(0, [&result_2, &result_3]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -1509,13 +1728,22 @@ impl Hopper {
 
     #[inline(always)]
     fn project_momenta_in_6_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), freed: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), sigma: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_e = 0.8333333333333334 * p_0;
             let sigma_0 = 1.2 * foot_e;
@@ -1527,21 +1755,21 @@ impl Hopper {
             let freed_1 = p_1 - sigma_3;
             // foot: loops and couplings
             let freed_0 = p_0 - sigma_0;
-            results[0][l] = foot_v;
-            results[1][l] = 0.0;
-            results[2][l] = freed_0;
-            results[3][l] = freed_1;
-            results[4][l] = sigma_0;
-            results[5][l] = 0.0;
-            results[6][l] = 0.0;
-            results[7][l] = sigma_3;
-            results[8][l] = 0.0;
+            result_0[l] = foot_v;
+            result_1[l] = 0.0;
+            result_2[l] = freed_0;
+            result_3[l] = freed_1;
+            result_4[l] = sigma_0;
+            result_5[l] = 0.0;
+            result_6[l] = 0.0;
+            result_7[l] = sigma_3;
+            result_8[l] = 0.0;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        freed.give_pair(0, [&results[2], &results[3]]);
-        sigma.give_pair(0, [&results[4], &results[5]]);
-        sigma.give_pair(2, [&results[6], &results[7]]);
-        sigma.give(4, &results[8]);
+        v.give_pair(0, [&result_0, &result_1]);
+        freed.give_pair(0, [&result_2, &result_3]);
+        sigma.give_pair(0, [&result_4, &result_5]);
+        sigma.give_pair(2, [&result_6, &result_7]);
+        sigma.give(4, &result_8);
     }
 
     /// Multipliers `λ` of the constraints, N and N m.
@@ -1554,15 +1782,21 @@ impl Hopper {
 
     #[inline(always)]
     fn multipliers_in_6_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), lambda: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 3]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = tau.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = tau.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let tau_0 = given[1][l];
-            let tau_1 = given[2][l];
+            let q_1 = given_0[l];
+            let tau_0 = given_1[l];
+            let tau_1 = given_2[l];
             // trunk: gravity and wrenches
             let trunk_t0 = 400.0 * q_1;
             let trunk_t1 = tau_1 - trunk_t0;
@@ -1574,15 +1808,15 @@ impl Hopper {
             let foot_t1 = 0.8333333333333334 * lambda_0;
             let foot_a = foot_e - foot_t1;
             let lambda_3 = trunk_t1 - foot_a;
-            results[0][l] = lambda_0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = lambda_3;
-            results[4][l] = 0.0;
+            result_0[l] = lambda_0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = lambda_3;
+            result_4[l] = 0.0;
         }
-        lambda.give_pair(0, [&results[0], &results[1]]);
-        lambda.give_pair(2, [&results[2], &results[3]]);
-        lambda.give(4, &results[4]);
+        lambda.give_pair(0, [&result_0, &result_1]);
+        lambda.give_pair(2, [&result_2, &result_3]);
+        lambda.give(4, &result_4);
     }
 
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
@@ -1594,17 +1828,23 @@ impl Hopper {
 
     #[inline(always)]
     fn rates_in_7_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = p.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(0, l); }
-        for l in 0..LANES { given[3][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = p.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(0, l); }
+        for l in 0..LANES { given_3[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let p_0 = given[1][l];
-            let tau_0 = given[2][l];
-            let tau_1 = given[3][l];
+            let q_1 = given_0[l];
+            let p_0 = given_1[l];
+            let tau_0 = given_2[l];
+            let tau_1 = given_3[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_e = 0.8333333333333334 * p_0;
             let foot_t0 = 1.2 * foot_e;
@@ -1616,13 +1856,13 @@ impl Hopper {
             let trunk_t1 = trunk_t0 + 9.81;
             let pd_0 = tau_0 - 11.772;
             let pd_1 = tau_1 - trunk_t1;
-            results[0][l] = foot_v;
-            results[1][l] = 0.0;
-            results[2][l] = pd_0;
-            results[3][l] = pd_1;
+            result_0[l] = foot_v;
+            result_1[l] = 0.0;
+            result_2[l] = pd_0;
+            result_3[l] = pd_1;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        pd.give_pair(0, [&results[2], &results[3]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        pd.give_pair(0, [&result_2, &result_3]);
     }
 
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
@@ -1634,13 +1874,22 @@ impl Hopper {
 
     #[inline(always)]
     fn project_momenta_in_7_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), freed: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), sigma: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
             // foot: bias momentum D, D' (4.45, 4.49)
             let foot_e = 0.8333333333333334 * p_0;
             let sigma_0 = 1.2 * foot_e;
@@ -1652,21 +1901,21 @@ impl Hopper {
             let freed_1 = p_1 - sigma_3;
             // foot: loops and couplings
             let freed_0 = p_0 - sigma_0;
-            results[0][l] = foot_v;
-            results[1][l] = 0.0;
-            results[2][l] = freed_0;
-            results[3][l] = freed_1;
-            results[4][l] = sigma_0;
-            results[5][l] = 0.0;
-            results[6][l] = 0.0;
-            results[7][l] = sigma_3;
-            results[8][l] = 0.0;
+            result_0[l] = foot_v;
+            result_1[l] = 0.0;
+            result_2[l] = freed_0;
+            result_3[l] = freed_1;
+            result_4[l] = sigma_0;
+            result_5[l] = 0.0;
+            result_6[l] = 0.0;
+            result_7[l] = sigma_3;
+            result_8[l] = 0.0;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        freed.give_pair(0, [&results[2], &results[3]]);
-        sigma.give_pair(0, [&results[4], &results[5]]);
-        sigma.give_pair(2, [&results[6], &results[7]]);
-        sigma.give(4, &results[8]);
+        v.give_pair(0, [&result_0, &result_1]);
+        freed.give_pair(0, [&result_2, &result_3]);
+        sigma.give_pair(0, [&result_4, &result_5]);
+        sigma.give_pair(2, [&result_6, &result_7]);
+        sigma.give(4, &result_8);
     }
 
     /// Multipliers `λ` of the constraints, N and N m.
@@ -1679,15 +1928,21 @@ impl Hopper {
 
     #[inline(always)]
     fn multipliers_in_7_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), lambda: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 3]);
-        for l in 0..LANES { given[0][l] = q.get(1, l); }
-        for l in 0..LANES { given[1][l] = tau.get(0, l); }
-        for l in 0..LANES { given[2][l] = tau.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(1, l); }
+        for l in 0..LANES { given_1[l] = tau.get(0, l); }
+        for l in 0..LANES { given_2[l] = tau.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
         for l in 0..LANES {
-            let q_1 = given[0][l];
-            let tau_0 = given[1][l];
-            let tau_1 = given[2][l];
+            let q_1 = given_0[l];
+            let tau_0 = given_1[l];
+            let tau_1 = given_2[l];
             // trunk: gravity and wrenches
             let trunk_t0 = 400.0 * q_1;
             let trunk_t1 = tau_1 - trunk_t0;
@@ -1699,15 +1954,15 @@ impl Hopper {
             let foot_t1 = 0.8333333333333334 * lambda_0;
             let foot_a = foot_e - foot_t1;
             let lambda_3 = trunk_t1 - foot_a;
-            results[0][l] = lambda_0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = lambda_3;
-            results[4][l] = 0.0;
+            result_0[l] = lambda_0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = lambda_3;
+            result_4[l] = 0.0;
         }
-        lambda.give_pair(0, [&results[0], &results[1]]);
-        lambda.give_pair(2, [&results[2], &results[3]]);
-        lambda.give(4, &results[4]);
+        lambda.give_pair(0, [&result_0, &result_1]);
+        lambda.give_pair(2, [&result_2, &result_3]);
+        lambda.give(4, &result_4);
     }
 }
 

@@ -81,7 +81,7 @@ impl Panda {
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 934 operations: 437 additions, 490 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 8], p: &[f64; 8], qd: &mut [f64; 8], pd: &mut [f64; 8]) {
-        Self::rates_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &self.tau, qd, pd);
+        ::multibody::runtime::kernel::call_exact::<Self, 0, _>((q, p, &self.tau, qd, pd,));
     }
 
     #[inline(always)]
@@ -103,43 +103,74 @@ impl Panda {
             angles[5][l] = panda_link7_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 17]);
-        for l in 0..LANES { given[0][l] = q.get(7, l); }
-        for l in 0..LANES { given[1][l] = p.get(0, l); }
-        for l in 0..LANES { given[2][l] = p.get(1, l); }
-        for l in 0..LANES { given[3][l] = p.get(2, l); }
-        for l in 0..LANES { given[4][l] = p.get(3, l); }
-        for l in 0..LANES { given[5][l] = p.get(4, l); }
-        for l in 0..LANES { given[6][l] = p.get(5, l); }
-        for l in 0..LANES { given[7][l] = p.get(6, l); }
-        for l in 0..LANES { given[8][l] = p.get(7, l); }
-        for l in 0..LANES { given[9][l] = tau.get(0, l); }
-        for l in 0..LANES { given[10][l] = tau.get(1, l); }
-        for l in 0..LANES { given[11][l] = tau.get(2, l); }
-        for l in 0..LANES { given[12][l] = tau.get(3, l); }
-        for l in 0..LANES { given[13][l] = tau.get(4, l); }
-        for l in 0..LANES { given[14][l] = tau.get(5, l); }
-        for l in 0..LANES { given[15][l] = tau.get(6, l); }
-        for l in 0..LANES { given[16][l] = tau.get(7, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 16]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(7, l); }
+        for l in 0..LANES { given_1[l] = p.get(0, l); }
+        for l in 0..LANES { given_2[l] = p.get(1, l); }
+        for l in 0..LANES { given_3[l] = p.get(2, l); }
+        for l in 0..LANES { given_4[l] = p.get(3, l); }
+        for l in 0..LANES { given_5[l] = p.get(4, l); }
+        for l in 0..LANES { given_6[l] = p.get(5, l); }
+        for l in 0..LANES { given_7[l] = p.get(6, l); }
+        for l in 0..LANES { given_8[l] = p.get(7, l); }
+        for l in 0..LANES { given_9[l] = tau.get(0, l); }
+        for l in 0..LANES { given_10[l] = tau.get(1, l); }
+        for l in 0..LANES { given_11[l] = tau.get(2, l); }
+        for l in 0..LANES { given_12[l] = tau.get(3, l); }
+        for l in 0..LANES { given_13[l] = tau.get(4, l); }
+        for l in 0..LANES { given_14[l] = tau.get(5, l); }
+        for l in 0..LANES { given_15[l] = tau.get(6, l); }
+        for l in 0..LANES { given_16[l] = tau.get(7, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
         for l in 0..LANES {
-            let q_7 = given[0][l];
-            let p_0 = given[1][l];
-            let p_1 = given[2][l];
-            let p_2 = given[3][l];
-            let p_3 = given[4][l];
-            let p_4 = given[5][l];
-            let p_5 = given[6][l];
-            let p_6 = given[7][l];
-            let p_7 = given[8][l];
-            let tau_0 = given[9][l];
-            let tau_1 = given[10][l];
-            let tau_2 = given[11][l];
-            let tau_3 = given[12][l];
-            let tau_4 = given[13][l];
-            let tau_5 = given[14][l];
-            let tau_6 = given[15][l];
-            let tau_7 = given[16][l];
+            let q_7 = given_0[l];
+            let p_0 = given_1[l];
+            let p_1 = given_2[l];
+            let p_2 = given_3[l];
+            let p_3 = given_4[l];
+            let p_4 = given_5[l];
+            let p_5 = given_6[l];
+            let p_6 = given_7[l];
+            let p_7 = given_8[l];
+            let tau_0 = given_9[l];
+            let tau_1 = given_10[l];
+            let tau_2 = given_11[l];
+            let tau_3 = given_12[l];
+            let tau_4 = given_13[l];
+            let tau_5 = given_14[l];
+            let tau_6 = given_15[l];
+            let tau_7 = given_16[l];
             // panda_link2: sine and cosine, rotation
             let panda_link2_sin = sines[0][l];
             let panda_link2_cos = cosines[0][l];
@@ -1131,37 +1162,37 @@ impl Panda {
             let pd_5 = tau_5 + panda_link6_t70;
             let pd_6 = tau_6 + panda_link7_t73;
             let pd_7 = tau_7 - panda_rightfinger_t12;
-            results[0][l] = panda_link1_e;
-            results[1][l] = panda_link2_v;
-            results[2][l] = -panda_link3_minus_v;
-            results[3][l] = panda_link4_v;
-            results[4][l] = panda_link5_v;
-            results[5][l] = panda_link6_v;
-            results[6][l] = panda_link7_v;
-            results[7][l] = panda_leftfinger_v;
-            results[8][l] = pd_0;
-            results[9][l] = pd_1;
-            results[10][l] = pd_2;
-            results[11][l] = pd_3;
-            results[12][l] = pd_4;
-            results[13][l] = pd_5;
-            results[14][l] = pd_6;
-            results[15][l] = pd_7;
+            result_0[l] = panda_link1_e;
+            result_1[l] = panda_link2_v;
+            result_2[l] = -panda_link3_minus_v;
+            result_3[l] = panda_link4_v;
+            result_4[l] = panda_link5_v;
+            result_5[l] = panda_link6_v;
+            result_6[l] = panda_link7_v;
+            result_7[l] = panda_leftfinger_v;
+            result_8[l] = pd_0;
+            result_9[l] = pd_1;
+            result_10[l] = pd_2;
+            result_11[l] = pd_3;
+            result_12[l] = pd_4;
+            result_13[l] = pd_5;
+            result_14[l] = pd_6;
+            result_15[l] = pd_7;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
-        qd.give_pair(6, [&results[6], &results[7]]);
-        pd.give_pair(0, [&results[8], &results[9]]);
-        pd.give_pair(2, [&results[10], &results[11]]);
-        pd.give_pair(4, [&results[12], &results[13]]);
-        pd.give_pair(6, [&results[14], &results[15]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
+        qd.give_pair(6, [&result_6, &result_7]);
+        pd.give_pair(0, [&result_8, &result_9]);
+        pd.give_pair(2, [&result_10, &result_11]);
+        pd.give_pair(4, [&result_12, &result_13]);
+        pd.give_pair(6, [&result_14, &result_15]);
     }
 
     /// Velocities from momenta.
     /// 606 operations: 292 additions, 307 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 8], p: &[f64; 8], v: &mut [f64; 8]) {
-        Self::velocities_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, v);
+        ::multibody::runtime::kernel::call_exact::<Self, 1, _>((q, p, v,));
     }
 
     #[inline(always)]
@@ -1183,27 +1214,42 @@ impl Panda {
             angles[5][l] = panda_link7_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
-        for l in 0..LANES { given[0][l] = q.get(7, l); }
-        for l in 0..LANES { given[1][l] = p.get(0, l); }
-        for l in 0..LANES { given[2][l] = p.get(1, l); }
-        for l in 0..LANES { given[3][l] = p.get(2, l); }
-        for l in 0..LANES { given[4][l] = p.get(3, l); }
-        for l in 0..LANES { given[5][l] = p.get(4, l); }
-        for l in 0..LANES { given[6][l] = p.get(5, l); }
-        for l in 0..LANES { given[7][l] = p.get(6, l); }
-        for l in 0..LANES { given[8][l] = p.get(7, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(7, l); }
+        for l in 0..LANES { given_1[l] = p.get(0, l); }
+        for l in 0..LANES { given_2[l] = p.get(1, l); }
+        for l in 0..LANES { given_3[l] = p.get(2, l); }
+        for l in 0..LANES { given_4[l] = p.get(3, l); }
+        for l in 0..LANES { given_5[l] = p.get(4, l); }
+        for l in 0..LANES { given_6[l] = p.get(5, l); }
+        for l in 0..LANES { given_7[l] = p.get(6, l); }
+        for l in 0..LANES { given_8[l] = p.get(7, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
         for l in 0..LANES {
-            let q_7 = given[0][l];
-            let p_0 = given[1][l];
-            let p_1 = given[2][l];
-            let p_2 = given[3][l];
-            let p_3 = given[4][l];
-            let p_4 = given[5][l];
-            let p_5 = given[6][l];
-            let p_6 = given[7][l];
-            let p_7 = given[8][l];
+            let q_7 = given_0[l];
+            let p_0 = given_1[l];
+            let p_1 = given_2[l];
+            let p_2 = given_3[l];
+            let p_3 = given_4[l];
+            let p_4 = given_5[l];
+            let p_5 = given_6[l];
+            let p_6 = given_7[l];
+            let p_7 = given_8[l];
             // panda_link2: sine and cosine, rotation
             let panda_link2_sin = sines[0][l];
             let panda_link2_cos = cosines[0][l];
@@ -1845,25 +1891,25 @@ impl Panda {
             let panda_link3_t290 = panda_link3_t288 - panda_link3_t289;
             let panda_link3_t291 = panda_link3_t119 * panda_link4_v;
             let panda_link7_v = panda_link3_t290 + panda_link3_t291;
-            results[0][l] = panda_link1_e;
-            results[1][l] = panda_link2_v;
-            results[2][l] = panda_link3_v;
-            results[3][l] = panda_link4_v;
-            results[4][l] = panda_link5_v;
-            results[5][l] = panda_link6_v;
-            results[6][l] = panda_link7_v;
-            results[7][l] = panda_leftfinger_v;
+            result_0[l] = panda_link1_e;
+            result_1[l] = panda_link2_v;
+            result_2[l] = panda_link3_v;
+            result_3[l] = panda_link4_v;
+            result_4[l] = panda_link5_v;
+            result_5[l] = panda_link6_v;
+            result_6[l] = panda_link7_v;
+            result_7[l] = panda_leftfinger_v;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        v.give_pair(2, [&results[2], &results[3]]);
-        v.give_pair(4, [&results[4], &results[5]]);
-        v.give_pair(6, [&results[6], &results[7]]);
+        v.give_pair(0, [&result_0, &result_1]);
+        v.give_pair(2, [&result_2, &result_3]);
+        v.give_pair(4, [&result_4, &result_5]);
+        v.give_pair(6, [&result_6, &result_7]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
     /// 369 operations: 164 additions, 205 multiplications, 0 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn momenta(&self, q: &[f64; 8], v: &[f64; 8], p: &mut [f64; 8]) {
-        Self::momenta_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, p);
+        ::multibody::runtime::kernel::call_exact::<Self, 2, _>((q, v, p,));
     }
 
     #[inline(always)]
@@ -1885,27 +1931,42 @@ impl Panda {
             angles[5][l] = panda_link7_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
-        for l in 0..LANES { given[0][l] = q.get(7, l); }
-        for l in 0..LANES { given[1][l] = v.get(0, l); }
-        for l in 0..LANES { given[2][l] = v.get(1, l); }
-        for l in 0..LANES { given[3][l] = v.get(2, l); }
-        for l in 0..LANES { given[4][l] = v.get(3, l); }
-        for l in 0..LANES { given[5][l] = v.get(4, l); }
-        for l in 0..LANES { given[6][l] = v.get(5, l); }
-        for l in 0..LANES { given[7][l] = v.get(6, l); }
-        for l in 0..LANES { given[8][l] = v.get(7, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(7, l); }
+        for l in 0..LANES { given_1[l] = v.get(0, l); }
+        for l in 0..LANES { given_2[l] = v.get(1, l); }
+        for l in 0..LANES { given_3[l] = v.get(2, l); }
+        for l in 0..LANES { given_4[l] = v.get(3, l); }
+        for l in 0..LANES { given_5[l] = v.get(4, l); }
+        for l in 0..LANES { given_6[l] = v.get(5, l); }
+        for l in 0..LANES { given_7[l] = v.get(6, l); }
+        for l in 0..LANES { given_8[l] = v.get(7, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
         for l in 0..LANES {
-            let q_7 = given[0][l];
-            let v_0 = given[1][l];
-            let v_1 = given[2][l];
-            let v_2 = given[3][l];
-            let v_3 = given[4][l];
-            let v_4 = given[5][l];
-            let v_5 = given[6][l];
-            let v_6 = given[7][l];
-            let v_7 = given[8][l];
+            let q_7 = given_0[l];
+            let v_0 = given_1[l];
+            let v_1 = given_2[l];
+            let v_2 = given_3[l];
+            let v_3 = given_4[l];
+            let v_4 = given_5[l];
+            let v_5 = given_6[l];
+            let v_6 = given_7[l];
+            let v_7 = given_8[l];
             // panda_link2: sine and cosine, rotation
             let panda_link2_sin = sines[0][l];
             let panda_link2_cos = cosines[0][l];
@@ -2316,26 +2377,26 @@ impl Panda {
             let panda_link2_t14 = panda_link2_cos * panda_link2_p_ry;
             let panda_link2_t15 = panda_link2_t13 - panda_link2_t14;
             let panda_link1_p_rz = panda_link1_t0 + panda_link2_t15;
-            results[0][l] = panda_link1_p_rz;
-            results[1][l] = -panda_link2_minus_p_rz;
-            results[2][l] = panda_link3_p_rz;
-            results[3][l] = -panda_link4_minus_p_rz;
-            results[4][l] = panda_link5_p_rz;
-            results[5][l] = panda_link6_p_rz;
-            results[6][l] = -panda_link7_minus_p_rz;
-            results[7][l] = p_7;
+            result_0[l] = panda_link1_p_rz;
+            result_1[l] = -panda_link2_minus_p_rz;
+            result_2[l] = panda_link3_p_rz;
+            result_3[l] = -panda_link4_minus_p_rz;
+            result_4[l] = panda_link5_p_rz;
+            result_5[l] = panda_link6_p_rz;
+            result_6[l] = -panda_link7_minus_p_rz;
+            result_7[l] = p_7;
         }
-        p.give_pair(0, [&results[0], &results[1]]);
-        p.give_pair(2, [&results[2], &results[3]]);
-        p.give_pair(4, [&results[4], &results[5]]);
-        p.give_pair(6, [&results[6], &results[7]]);
+        p.give_pair(0, [&result_0, &result_1]);
+        p.give_pair(2, [&result_2, &result_3]);
+        p.give_pair(4, [&result_4, &result_5]);
+        p.give_pair(6, [&result_6, &result_7]);
     }
 
     /// Kinetic and potential energy, J.
     /// 630 operations: 304 additions, 319 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 8], p: &[f64; 8]) -> [f64; 2] {
         let mut energy = [0.0; 2];
-        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut energy);
+        ::multibody::runtime::kernel::call_exact::<Self, 3, _>((q, p, &mut energy,));
         energy
     }
 
@@ -2358,27 +2419,36 @@ impl Panda {
             angles[5][l] = panda_link7_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
-        for l in 0..LANES { given[0][l] = q.get(7, l); }
-        for l in 0..LANES { given[1][l] = p.get(0, l); }
-        for l in 0..LANES { given[2][l] = p.get(1, l); }
-        for l in 0..LANES { given[3][l] = p.get(2, l); }
-        for l in 0..LANES { given[4][l] = p.get(3, l); }
-        for l in 0..LANES { given[5][l] = p.get(4, l); }
-        for l in 0..LANES { given[6][l] = p.get(5, l); }
-        for l in 0..LANES { given[7][l] = p.get(6, l); }
-        for l in 0..LANES { given[8][l] = p.get(7, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(7, l); }
+        for l in 0..LANES { given_1[l] = p.get(0, l); }
+        for l in 0..LANES { given_2[l] = p.get(1, l); }
+        for l in 0..LANES { given_3[l] = p.get(2, l); }
+        for l in 0..LANES { given_4[l] = p.get(3, l); }
+        for l in 0..LANES { given_5[l] = p.get(4, l); }
+        for l in 0..LANES { given_6[l] = p.get(5, l); }
+        for l in 0..LANES { given_7[l] = p.get(6, l); }
+        for l in 0..LANES { given_8[l] = p.get(7, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let q_7 = given[0][l];
-            let p_0 = given[1][l];
-            let p_1 = given[2][l];
-            let p_2 = given[3][l];
-            let p_3 = given[4][l];
-            let p_4 = given[5][l];
-            let p_5 = given[6][l];
-            let p_6 = given[7][l];
-            let p_7 = given[8][l];
+            let q_7 = given_0[l];
+            let p_0 = given_1[l];
+            let p_1 = given_2[l];
+            let p_2 = given_3[l];
+            let p_3 = given_4[l];
+            let p_4 = given_5[l];
+            let p_5 = given_6[l];
+            let p_6 = given_7[l];
+            let p_7 = given_8[l];
             // panda_link2: sine and cosine, rotation
             let panda_link2_sin = sines[0][l];
             let panda_link2_cos = cosines[0][l];
@@ -3052,16 +3122,16 @@ impl Panda {
             let panda_link1_t3 = panda_link1_t2 - 5.355075983920001;
             // ground: energy
             let minus_energy_1 = 9.81 * panda_link1_t3;
-            results[0][l] = energy_0;
-            results[1][l] = -minus_energy_1;
+            result_0[l] = energy_0;
+            result_1[l] = -minus_energy_1;
         }
-        energy.give_pair(0, [&results[0], &results[1]]);
+        energy.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
     /// 1224 operations: 593 additions, 624 multiplications, 7 divisions; apart: 0 square roots, 6 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 8], v: &[f64; 8], a: &mut [f64; 8]) {
-        Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, a);
+        ::multibody::runtime::kernel::call_exact::<Self, 4, _>((q, v, &self.tau, a,));
     }
 
     #[inline(always)]
@@ -3083,44 +3153,67 @@ impl Panda {
             angles[5][l] = panda_link7_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 17]);
-        for l in 0..LANES { given[0][l] = q.get(7, l); }
-        for l in 0..LANES { given[1][l] = v.get(0, l); }
-        for l in 0..LANES { given[2][l] = v.get(1, l); }
-        for l in 0..LANES { given[3][l] = v.get(2, l); }
-        for l in 0..LANES { given[4][l] = v.get(3, l); }
-        for l in 0..LANES { given[5][l] = v.get(4, l); }
-        for l in 0..LANES { given[6][l] = v.get(5, l); }
-        for l in 0..LANES { given[7][l] = v.get(6, l); }
-        for l in 0..LANES { given[8][l] = v.get(7, l); }
-        for l in 0..LANES { given[9][l] = tau.get(0, l); }
-        for l in 0..LANES { given[10][l] = tau.get(1, l); }
-        for l in 0..LANES { given[11][l] = tau.get(2, l); }
-        for l in 0..LANES { given[12][l] = tau.get(3, l); }
-        for l in 0..LANES { given[13][l] = tau.get(4, l); }
-        for l in 0..LANES { given[14][l] = tau.get(5, l); }
-        for l in 0..LANES { given[15][l] = tau.get(6, l); }
-        for l in 0..LANES { given[16][l] = tau.get(7, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(7, l); }
+        for l in 0..LANES { given_1[l] = v.get(0, l); }
+        for l in 0..LANES { given_2[l] = v.get(1, l); }
+        for l in 0..LANES { given_3[l] = v.get(2, l); }
+        for l in 0..LANES { given_4[l] = v.get(3, l); }
+        for l in 0..LANES { given_5[l] = v.get(4, l); }
+        for l in 0..LANES { given_6[l] = v.get(5, l); }
+        for l in 0..LANES { given_7[l] = v.get(6, l); }
+        for l in 0..LANES { given_8[l] = v.get(7, l); }
+        for l in 0..LANES { given_9[l] = tau.get(0, l); }
+        for l in 0..LANES { given_10[l] = tau.get(1, l); }
+        for l in 0..LANES { given_11[l] = tau.get(2, l); }
+        for l in 0..LANES { given_12[l] = tau.get(3, l); }
+        for l in 0..LANES { given_13[l] = tau.get(4, l); }
+        for l in 0..LANES { given_14[l] = tau.get(5, l); }
+        for l in 0..LANES { given_15[l] = tau.get(6, l); }
+        for l in 0..LANES { given_16[l] = tau.get(7, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
         for l in 0..LANES {
             let (q_7, v_1, v_2, v_3, v_4, v_5, v_6, v_7, tau_0, tau_1, tau_2, tau_3, tau_4, tau_5, tau_6, tau_7, panda_link2_sin, panda_link2_cos, panda_link3_sin, panda_link3_cos, panda_link4_sin, panda_link4_cos, panda_link5_sin, panda_link5_cos, panda_link6_sin, panda_link6_cos, panda_link7_sin, panda_link7_cos, panda_link7_u_ry, panda_link6_t22, panda_link5_t65, panda_link4_t45, panda_link3_t44, panda_link3_t46, panda_link3_t91, panda_link3_t92, panda_link3_t93, panda_link3_t94, panda_link3_t110, panda_link3_t111, panda_link3_t112, panda_link3_t113, panda_link3_t116, panda_link3_t118, panda_link3_t119, panda_link3_t121, panda_link3_t140, panda_link3_t141, panda_link3_t142, panda_link3_t143, panda_link3_t159, panda_link3_t160, panda_link3_t161, panda_link3_t162, panda_link3_t165, panda_link3_t167, panda_link3_t176, panda_link3_t177, panda_link3_t178, panda_link3_t179, panda_link3_t195, panda_link3_t196, panda_link3_t197, panda_link3_t198, panda_link3_t201, panda_link3_t202, panda_link3_t203, panda_link3_t204, panda_link3_minus_u_rx, panda_link3_minus_u_ry, panda_link3_rho, panda_link3_minus_k_rx, panda_link3_minus_k_ry, panda_link2_minus_u_ry, panda_link2_rho, panda_link2_minus_k_ry, panda_link1_rho, panda_link2_alpha_y, panda_link3_alpha_y, panda_link4_alpha_y, panda_link5_alpha_y, panda_link6_alpha_y, panda_link2_minus_f_rx, panda_link2_f_ry, panda_link2_minus_f_rz, panda_link3_minus_f_x, panda_link3_minus_f_y, panda_link3_minus_f_rx, panda_link3_f_ry, panda_link3_f_rz, panda_link4_f_x, panda_link4_f_y, panda_link4_f_z, panda_link4_minus_f_rx, panda_link4_f_ry, panda_link4_f_rz, panda_link5_f_x, panda_link5_minus_f_y, panda_link5_f_z, panda_link5_minus_f_rx, panda_link5_f_ry, panda_link5_minus_f_rz, panda_link6_minus_f_x, panda_link6_minus_f_y, panda_link6_minus_f_z, panda_link6_minus_f_rx, panda_link6_f_ry, panda_link6_f_rz, panda_link7_minus_f_x, panda_link7_minus_f_y, panda_link7_minus_f_z, panda_link7_f_rx, panda_link7_f_ry, panda_link7_minus_f_rz, panda_leftfinger_minus_f_x, panda_leftfinger_f_y, panda_leftfinger_minus_f_z, panda_rightfinger_f_x, panda_rightfinger_f_y, panda_rightfinger_f_z, panda_link1_t0) = {
-                let q_7 = given[0][l];
-                let v_0 = given[1][l];
-                let v_1 = given[2][l];
-                let v_2 = given[3][l];
-                let v_3 = given[4][l];
-                let v_4 = given[5][l];
-                let v_5 = given[6][l];
-                let v_6 = given[7][l];
-                let v_7 = given[8][l];
-                let tau_0 = given[9][l];
-                let tau_1 = given[10][l];
-                let tau_2 = given[11][l];
-                let tau_3 = given[12][l];
-                let tau_4 = given[13][l];
-                let tau_5 = given[14][l];
-                let tau_6 = given[15][l];
-                let tau_7 = given[16][l];
+                let q_7 = given_0[l];
+                let v_0 = given_1[l];
+                let v_1 = given_2[l];
+                let v_2 = given_3[l];
+                let v_3 = given_4[l];
+                let v_4 = given_5[l];
+                let v_5 = given_6[l];
+                let v_6 = given_7[l];
+                let v_7 = given_8[l];
+                let tau_0 = given_9[l];
+                let tau_1 = given_10[l];
+                let tau_2 = given_11[l];
+                let tau_3 = given_12[l];
+                let tau_4 = given_13[l];
+                let tau_5 = given_14[l];
+                let tau_6 = given_15[l];
+                let tau_7 = given_16[l];
                 // panda_link2: sine and cosine, rotation
                 let panda_link2_sin = sines[0][l];
                 let panda_link2_cos = cosines[0][l];
@@ -4428,19 +4521,19 @@ impl Panda {
                 let a_6 = panda_link6_alpha_y + panda_link7_a;
                 (panda_leftfinger_a, panda_link1_e, panda_link2_a, a_2, a_3, a_4, a_5, a_6)
             };
-            results[0][l] = panda_link1_e;
-            results[1][l] = panda_link2_a;
-            results[2][l] = a_2;
-            results[3][l] = a_3;
-            results[4][l] = a_4;
-            results[5][l] = a_5;
-            results[6][l] = a_6;
-            results[7][l] = panda_leftfinger_a;
+            result_0[l] = panda_link1_e;
+            result_1[l] = panda_link2_a;
+            result_2[l] = a_2;
+            result_3[l] = a_3;
+            result_4[l] = a_4;
+            result_5[l] = a_5;
+            result_6[l] = a_6;
+            result_7[l] = panda_leftfinger_a;
         }
-        a.give_pair(0, [&results[0], &results[1]]);
-        a.give_pair(2, [&results[2], &results[3]]);
-        a.give_pair(4, [&results[4], &results[5]]);
-        a.give_pair(6, [&results[6], &results[7]]);
+        a.give_pair(0, [&result_0, &result_1]);
+        a.give_pair(2, [&result_2, &result_3]);
+        a.give_pair(4, [&result_4, &result_5]);
+        a.give_pair(6, [&result_6, &result_7]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -4451,38 +4544,52 @@ impl Panda {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = v.get(6, l); }
-        for l in 0..LANES { given[7][l] = v.get(7, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = v.get(6, l); }
+        for l in 0..LANES { given_7[l] = v.get(7, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let v_6 = given[6][l];
-            let v_7 = given[7][l];
-            results[0][l] = v_0;
-            results[1][l] = v_1;
-            results[2][l] = v_2;
-            results[3][l] = v_3;
-            results[4][l] = v_4;
-            results[5][l] = v_5;
-            results[6][l] = v_6;
-            results[7][l] = v_7;
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let v_6 = given_6[l];
+            let v_7 = given_7[l];
+            result_0[l] = v_0;
+            result_1[l] = v_1;
+            result_2[l] = v_2;
+            result_3[l] = v_3;
+            result_4[l] = v_4;
+            result_5[l] = v_5;
+            result_6[l] = v_6;
+            result_7[l] = v_7;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
-        qd.give_pair(6, [&results[6], &results[7]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
+        qd.give_pair(6, [&result_6, &result_7]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

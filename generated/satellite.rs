@@ -98,57 +98,92 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 24]);
-        for l in 0..LANES { given[0][l] = q.get(3, l); }
-        for l in 0..LANES { given[1][l] = q.get(4, l); }
-        for l in 0..LANES { given[2][l] = q.get(5, l); }
-        for l in 0..LANES { given[3][l] = q.get(6, l); }
-        for l in 0..LANES { given[4][l] = p.get(0, l); }
-        for l in 0..LANES { given[5][l] = p.get(1, l); }
-        for l in 0..LANES { given[6][l] = p.get(2, l); }
-        for l in 0..LANES { given[7][l] = p.get(3, l); }
-        for l in 0..LANES { given[8][l] = p.get(4, l); }
-        for l in 0..LANES { given[9][l] = p.get(5, l); }
-        for l in 0..LANES { given[10][l] = tau.get(0, l); }
-        for l in 0..LANES { given[11][l] = tau.get(1, l); }
-        for l in 0..LANES { given[12][l] = tau.get(2, l); }
-        for l in 0..LANES { given[13][l] = tau.get(3, l); }
-        for l in 0..LANES { given[14][l] = tau.get(4, l); }
-        for l in 0..LANES { given[15][l] = tau.get(5, l); }
-        for l in 0..LANES { given[16][l] = drive_v.get(0, l); }
-        for l in 0..LANES { given[17][l] = drive_v.get(1, l); }
-        for l in 0..LANES { given[18][l] = wrenches.get(0, l); }
-        for l in 0..LANES { given[19][l] = wrenches.get(1, l); }
-        for l in 0..LANES { given[20][l] = wrenches.get(2, l); }
-        for l in 0..LANES { given[21][l] = wrenches.get(3, l); }
-        for l in 0..LANES { given[22][l] = wrenches.get(4, l); }
-        for l in 0..LANES { given[23][l] = wrenches.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 13]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        let mut given_18 = [0.0; LANES];
+        let mut given_19 = [0.0; LANES];
+        let mut given_20 = [0.0; LANES];
+        let mut given_21 = [0.0; LANES];
+        let mut given_22 = [0.0; LANES];
+        let mut given_23 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(3, l); }
+        for l in 0..LANES { given_1[l] = q.get(4, l); }
+        for l in 0..LANES { given_2[l] = q.get(5, l); }
+        for l in 0..LANES { given_3[l] = q.get(6, l); }
+        for l in 0..LANES { given_4[l] = p.get(0, l); }
+        for l in 0..LANES { given_5[l] = p.get(1, l); }
+        for l in 0..LANES { given_6[l] = p.get(2, l); }
+        for l in 0..LANES { given_7[l] = p.get(3, l); }
+        for l in 0..LANES { given_8[l] = p.get(4, l); }
+        for l in 0..LANES { given_9[l] = p.get(5, l); }
+        for l in 0..LANES { given_10[l] = tau.get(0, l); }
+        for l in 0..LANES { given_11[l] = tau.get(1, l); }
+        for l in 0..LANES { given_12[l] = tau.get(2, l); }
+        for l in 0..LANES { given_13[l] = tau.get(3, l); }
+        for l in 0..LANES { given_14[l] = tau.get(4, l); }
+        for l in 0..LANES { given_15[l] = tau.get(5, l); }
+        for l in 0..LANES { given_16[l] = drive_v.get(0, l); }
+        for l in 0..LANES { given_17[l] = drive_v.get(1, l); }
+        for l in 0..LANES { given_18[l] = wrenches.get(0, l); }
+        for l in 0..LANES { given_19[l] = wrenches.get(1, l); }
+        for l in 0..LANES { given_20[l] = wrenches.get(2, l); }
+        for l in 0..LANES { given_21[l] = wrenches.get(3, l); }
+        for l in 0..LANES { given_22[l] = wrenches.get(4, l); }
+        for l in 0..LANES { given_23[l] = wrenches.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
         for l in 0..LANES {
-            let q_3 = given[0][l];
-            let q_4 = given[1][l];
-            let q_5 = given[2][l];
-            let q_6 = given[3][l];
-            let p_0 = given[4][l];
-            let p_1 = given[5][l];
-            let p_2 = given[6][l];
-            let p_3 = given[7][l];
-            let p_4 = given[8][l];
-            let p_5 = given[9][l];
-            let tau_0 = given[10][l];
-            let tau_1 = given[11][l];
-            let tau_2 = given[12][l];
-            let tau_3 = given[13][l];
-            let tau_4 = given[14][l];
-            let tau_5 = given[15][l];
-            let drive_v_0 = given[16][l];
-            let drive_v_1 = given[17][l];
-            let wrenches_0 = given[18][l];
-            let wrenches_1 = given[19][l];
-            let wrenches_2 = given[20][l];
-            let wrenches_3 = given[21][l];
-            let wrenches_4 = given[22][l];
-            let wrenches_5 = given[23][l];
+            let q_3 = given_0[l];
+            let q_4 = given_1[l];
+            let q_5 = given_2[l];
+            let q_6 = given_3[l];
+            let p_0 = given_4[l];
+            let p_1 = given_5[l];
+            let p_2 = given_6[l];
+            let p_3 = given_7[l];
+            let p_4 = given_8[l];
+            let p_5 = given_9[l];
+            let tau_0 = given_10[l];
+            let tau_1 = given_11[l];
+            let tau_2 = given_12[l];
+            let tau_3 = given_13[l];
+            let tau_4 = given_14[l];
+            let tau_5 = given_15[l];
+            let drive_v_0 = given_16[l];
+            let drive_v_1 = given_17[l];
+            let wrenches_0 = given_18[l];
+            let wrenches_1 = given_19[l];
+            let wrenches_2 = given_20[l];
+            let wrenches_3 = given_21[l];
+            let wrenches_4 = given_22[l];
+            let wrenches_5 = given_23[l];
             // bus: sine and cosine, rotation
             let bus_t0 = q_3 + q_3;
             let bus_t1 = q_4 + q_4;
@@ -436,27 +471,27 @@ impl Satellite {
             let pd_3 = tau_3 + bus_t141;
             let pd_4 = tau_4 + bus_t142;
             let pd_5 = tau_5 + bus_t143;
-            results[0][l] = qd_0;
-            results[1][l] = qd_1;
-            results[2][l] = qd_2;
-            results[3][l] = -minus_qd_3;
-            results[4][l] = qd_4;
-            results[5][l] = -minus_qd_5;
-            results[6][l] = -minus_qd_6;
-            results[7][l] = pd_0;
-            results[8][l] = pd_1;
-            results[9][l] = pd_2;
-            results[10][l] = pd_3;
-            results[11][l] = pd_4;
-            results[12][l] = pd_5;
+            result_0[l] = qd_0;
+            result_1[l] = qd_1;
+            result_2[l] = qd_2;
+            result_3[l] = -minus_qd_3;
+            result_4[l] = qd_4;
+            result_5[l] = -minus_qd_5;
+            result_6[l] = -minus_qd_6;
+            result_7[l] = pd_0;
+            result_8[l] = pd_1;
+            result_9[l] = pd_2;
+            result_10[l] = pd_3;
+            result_11[l] = pd_4;
+            result_12[l] = pd_5;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
-        qd.give(6, &results[6]);
-        pd.give_pair(0, [&results[7], &results[8]]);
-        pd.give_pair(2, [&results[9], &results[10]]);
-        pd.give_pair(4, [&results[11], &results[12]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
+        qd.give(6, &result_6);
+        pd.give_pair(0, [&result_7, &result_8]);
+        pd.give_pair(2, [&result_9, &result_10]);
+        pd.give_pair(4, [&result_11, &result_12]);
     }
 
     /// Velocities from momenta.
@@ -476,25 +511,37 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(4, l); }
-        for l in 0..LANES { given[5][l] = p.get(5, l); }
-        for l in 0..LANES { given[6][l] = drive_v.get(0, l); }
-        for l in 0..LANES { given[7][l] = drive_v.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(4, l); }
+        for l in 0..LANES { given_5[l] = p.get(5, l); }
+        for l in 0..LANES { given_6[l] = drive_v.get(0, l); }
+        for l in 0..LANES { given_7[l] = drive_v.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
-            let p_2 = given[2][l];
-            let p_3 = given[3][l];
-            let p_4 = given[4][l];
-            let p_5 = given[5][l];
-            let drive_v_0 = given[6][l];
-            let drive_v_1 = given[7][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
+            let p_2 = given_2[l];
+            let p_3 = given_3[l];
+            let p_4 = given_4[l];
+            let p_5 = given_5[l];
+            let drive_v_0 = given_6[l];
+            let drive_v_1 = given_7[l];
             // panel_left: sine and cosine, rotation
             let panel_left_sin = sines[0][l];
             let panel_left_cos = cosines[0][l];
@@ -674,16 +721,16 @@ impl Satellite {
             let bus_t50 = 0.008695652173913038 * bus_minus_e_2;
             let bus_t51 = bus_t49 - bus_t50;
             let bus_v_4 = bus_e - bus_t51;
-            results[0][l] = bus_v_4;
-            results[1][l] = bus_v_3;
-            results[2][l] = bus_v_2;
-            results[3][l] = bus_v;
-            results[4][l] = -bus_minus_v;
-            results[5][l] = -bus_minus_e_2;
+            result_0[l] = bus_v_4;
+            result_1[l] = bus_v_3;
+            result_2[l] = bus_v_2;
+            result_3[l] = bus_v;
+            result_4[l] = -bus_minus_v;
+            result_5[l] = -bus_minus_e_2;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        v.give_pair(2, [&results[2], &results[3]]);
-        v.give_pair(4, [&results[4], &results[5]]);
+        v.give_pair(0, [&result_0, &result_1]);
+        v.give_pair(2, [&result_2, &result_3]);
+        v.give_pair(4, [&result_4, &result_5]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -703,25 +750,37 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = drive_v.get(0, l); }
-        for l in 0..LANES { given[7][l] = drive_v.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = drive_v.get(0, l); }
+        for l in 0..LANES { given_7[l] = drive_v.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let drive_v_0 = given[6][l];
-            let drive_v_1 = given[7][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let drive_v_0 = given_6[l];
+            let drive_v_1 = given_7[l];
             // panel_left: sine and cosine, rotation
             let panel_left_sin = sines[0][l];
             let panel_left_cos = cosines[0][l];
@@ -869,16 +928,16 @@ impl Satellite {
             let bus_p_rx = panel_right_t31 - panel_left_t32;
             let bus_p_ry = panel_right_t32 - panel_left_t34;
             let bus_p_rz = panel_left_t30 - panel_right_t33;
-            results[0][l] = bus_p_x;
-            results[1][l] = bus_p_y;
-            results[2][l] = -bus_minus_p_z;
-            results[3][l] = bus_p_rx;
-            results[4][l] = bus_p_ry;
-            results[5][l] = bus_p_rz;
+            result_0[l] = bus_p_x;
+            result_1[l] = bus_p_y;
+            result_2[l] = -bus_minus_p_z;
+            result_3[l] = bus_p_rx;
+            result_4[l] = bus_p_ry;
+            result_5[l] = bus_p_rz;
         }
-        p.give_pair(0, [&results[0], &results[1]]);
-        p.give_pair(2, [&results[2], &results[3]]);
-        p.give_pair(4, [&results[4], &results[5]]);
+        p.give_pair(0, [&result_0, &result_1]);
+        p.give_pair(2, [&result_2, &result_3]);
+        p.give_pair(4, [&result_4, &result_5]);
     }
 
     /// Kinetic and potential energy, J.
@@ -900,25 +959,33 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(4, l); }
-        for l in 0..LANES { given[5][l] = p.get(5, l); }
-        for l in 0..LANES { given[6][l] = drive_v.get(0, l); }
-        for l in 0..LANES { given[7][l] = drive_v.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(4, l); }
+        for l in 0..LANES { given_5[l] = p.get(5, l); }
+        for l in 0..LANES { given_6[l] = drive_v.get(0, l); }
+        for l in 0..LANES { given_7[l] = drive_v.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
-            let p_2 = given[2][l];
-            let p_3 = given[3][l];
-            let p_4 = given[4][l];
-            let p_5 = given[5][l];
-            let drive_v_0 = given[6][l];
-            let drive_v_1 = given[7][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
+            let p_2 = given_2[l];
+            let p_3 = given_3[l];
+            let p_4 = given_4[l];
+            let p_5 = given_5[l];
+            let drive_v_0 = given_6[l];
+            let drive_v_1 = given_7[l];
             // panel_left: sine and cosine, rotation
             let panel_left_sin = sines[0][l];
             let panel_left_cos = cosines[0][l];
@@ -1146,16 +1213,16 @@ impl Satellite {
             let panel_right_t48 = drive_v_1 * panel_right_t47;
             let panel_right_t49 = panel_left_t46 + panel_right_t48;
             let energy_0 = 0.5 * panel_right_t49;
-            results[0][l] = energy_0;
-            results[1][l] = 0.0;
+            result_0[l] = energy_0;
+            result_1[l] = 0.0;
         }
-        energy.give_pair(0, [&results[0], &results[1]]);
+        energy.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
     /// 352 operations: 173 additions, 176 multiplications, 3 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 7], v: &[f64; 6], a: &mut [f64; 6]) {
-        Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(v, &self.tau, &self.drive_q, &self.drive_v, &self.drive_a, self.wrenches.as_flattened(), a);
+        ::multibody::runtime::kernel::call_exact::<Self, 4, _>((v, &self.tau, &self.drive_q, &self.drive_v, &self.drive_a, self.wrenches.as_flattened(), a,));
     }
 
     #[inline(always)]
@@ -1168,53 +1235,79 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 22]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = tau.get(0, l); }
-        for l in 0..LANES { given[7][l] = tau.get(1, l); }
-        for l in 0..LANES { given[8][l] = tau.get(2, l); }
-        for l in 0..LANES { given[9][l] = tau.get(3, l); }
-        for l in 0..LANES { given[10][l] = tau.get(4, l); }
-        for l in 0..LANES { given[11][l] = tau.get(5, l); }
-        for l in 0..LANES { given[12][l] = drive_v.get(0, l); }
-        for l in 0..LANES { given[13][l] = drive_v.get(1, l); }
-        for l in 0..LANES { given[14][l] = drive_a.get(0, l); }
-        for l in 0..LANES { given[15][l] = drive_a.get(1, l); }
-        for l in 0..LANES { given[16][l] = wrenches.get(0, l); }
-        for l in 0..LANES { given[17][l] = wrenches.get(1, l); }
-        for l in 0..LANES { given[18][l] = wrenches.get(2, l); }
-        for l in 0..LANES { given[19][l] = wrenches.get(3, l); }
-        for l in 0..LANES { given[20][l] = wrenches.get(4, l); }
-        for l in 0..LANES { given[21][l] = wrenches.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        let mut given_18 = [0.0; LANES];
+        let mut given_19 = [0.0; LANES];
+        let mut given_20 = [0.0; LANES];
+        let mut given_21 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = tau.get(0, l); }
+        for l in 0..LANES { given_7[l] = tau.get(1, l); }
+        for l in 0..LANES { given_8[l] = tau.get(2, l); }
+        for l in 0..LANES { given_9[l] = tau.get(3, l); }
+        for l in 0..LANES { given_10[l] = tau.get(4, l); }
+        for l in 0..LANES { given_11[l] = tau.get(5, l); }
+        for l in 0..LANES { given_12[l] = drive_v.get(0, l); }
+        for l in 0..LANES { given_13[l] = drive_v.get(1, l); }
+        for l in 0..LANES { given_14[l] = drive_a.get(0, l); }
+        for l in 0..LANES { given_15[l] = drive_a.get(1, l); }
+        for l in 0..LANES { given_16[l] = wrenches.get(0, l); }
+        for l in 0..LANES { given_17[l] = wrenches.get(1, l); }
+        for l in 0..LANES { given_18[l] = wrenches.get(2, l); }
+        for l in 0..LANES { given_19[l] = wrenches.get(3, l); }
+        for l in 0..LANES { given_20[l] = wrenches.get(4, l); }
+        for l in 0..LANES { given_21[l] = wrenches.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let tau_0 = given[6][l];
-            let tau_1 = given[7][l];
-            let tau_2 = given[8][l];
-            let tau_3 = given[9][l];
-            let tau_4 = given[10][l];
-            let tau_5 = given[11][l];
-            let drive_v_0 = given[12][l];
-            let drive_v_1 = given[13][l];
-            let drive_a_0 = given[14][l];
-            let drive_a_1 = given[15][l];
-            let wrenches_0 = given[16][l];
-            let wrenches_1 = given[17][l];
-            let wrenches_2 = given[18][l];
-            let wrenches_3 = given[19][l];
-            let wrenches_4 = given[20][l];
-            let wrenches_5 = given[21][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let tau_0 = given_6[l];
+            let tau_1 = given_7[l];
+            let tau_2 = given_8[l];
+            let tau_3 = given_9[l];
+            let tau_4 = given_10[l];
+            let tau_5 = given_11[l];
+            let drive_v_0 = given_12[l];
+            let drive_v_1 = given_13[l];
+            let drive_a_0 = given_14[l];
+            let drive_a_1 = given_15[l];
+            let wrenches_0 = given_16[l];
+            let wrenches_1 = given_17[l];
+            let wrenches_2 = given_18[l];
+            let wrenches_3 = given_19[l];
+            let wrenches_4 = given_20[l];
+            let wrenches_5 = given_21[l];
             // panel_left: sine and cosine, rotation
             let panel_left_sin = sines[0][l];
             let panel_left_cos = cosines[0][l];
@@ -1588,22 +1681,22 @@ impl Satellite {
             let a_0 = bus_a_4 - bus_t18;
             let a_1 = bus_a_3 - bus_t21;
             let a_2 = bus_a_2 - bus_t24;
-            results[0][l] = a_0;
-            results[1][l] = a_1;
-            results[2][l] = a_2;
-            results[3][l] = bus_a;
-            results[4][l] = -bus_minus_a;
-            results[5][l] = -bus_minus_e_2;
+            result_0[l] = a_0;
+            result_1[l] = a_1;
+            result_2[l] = a_2;
+            result_3[l] = bus_a;
+            result_4[l] = -bus_minus_a;
+            result_5[l] = -bus_minus_e_2;
         }
-        a.give_pair(0, [&results[0], &results[1]]);
-        a.give_pair(2, [&results[2], &results[3]]);
-        a.give_pair(4, [&results[4], &results[5]]);
+        a.give_pair(0, [&result_0, &result_1]);
+        a.give_pair(2, [&result_2, &result_3]);
+        a.give_pair(4, [&result_4, &result_5]);
     }
 
     /// Wrench `[force; moment]` that each joint transmits to its child, in the child's body frame, N and N m.
     /// 605 operations: 309 additions, 293 multiplications, 3 divisions; apart: 0 square roots, 2 sine-cosine pairs.
     pub fn reactions(&self, q: &[f64; 7], v: &[f64; 6], reactions: &mut [[f64; 6]; 3]) {
-        Self::reactions_kernel::<::multibody::runtime::kernel::Plain, 1>(v, &self.tau, &self.drive_q, &self.drive_v, &self.drive_a, self.wrenches.as_flattened(), reactions.as_flattened_mut());
+        ::multibody::runtime::kernel::call_exact::<Self, 5, _>((v, &self.tau, &self.drive_q, &self.drive_v, &self.drive_a, self.wrenches.as_flattened(), reactions.as_flattened_mut(),));
     }
 
     #[inline(always)]
@@ -1616,53 +1709,91 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 22]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = tau.get(0, l); }
-        for l in 0..LANES { given[7][l] = tau.get(1, l); }
-        for l in 0..LANES { given[8][l] = tau.get(2, l); }
-        for l in 0..LANES { given[9][l] = tau.get(3, l); }
-        for l in 0..LANES { given[10][l] = tau.get(4, l); }
-        for l in 0..LANES { given[11][l] = tau.get(5, l); }
-        for l in 0..LANES { given[12][l] = drive_v.get(0, l); }
-        for l in 0..LANES { given[13][l] = drive_v.get(1, l); }
-        for l in 0..LANES { given[14][l] = drive_a.get(0, l); }
-        for l in 0..LANES { given[15][l] = drive_a.get(1, l); }
-        for l in 0..LANES { given[16][l] = wrenches.get(0, l); }
-        for l in 0..LANES { given[17][l] = wrenches.get(1, l); }
-        for l in 0..LANES { given[18][l] = wrenches.get(2, l); }
-        for l in 0..LANES { given[19][l] = wrenches.get(3, l); }
-        for l in 0..LANES { given[20][l] = wrenches.get(4, l); }
-        for l in 0..LANES { given[21][l] = wrenches.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 18]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        let mut given_18 = [0.0; LANES];
+        let mut given_19 = [0.0; LANES];
+        let mut given_20 = [0.0; LANES];
+        let mut given_21 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = tau.get(0, l); }
+        for l in 0..LANES { given_7[l] = tau.get(1, l); }
+        for l in 0..LANES { given_8[l] = tau.get(2, l); }
+        for l in 0..LANES { given_9[l] = tau.get(3, l); }
+        for l in 0..LANES { given_10[l] = tau.get(4, l); }
+        for l in 0..LANES { given_11[l] = tau.get(5, l); }
+        for l in 0..LANES { given_12[l] = drive_v.get(0, l); }
+        for l in 0..LANES { given_13[l] = drive_v.get(1, l); }
+        for l in 0..LANES { given_14[l] = drive_a.get(0, l); }
+        for l in 0..LANES { given_15[l] = drive_a.get(1, l); }
+        for l in 0..LANES { given_16[l] = wrenches.get(0, l); }
+        for l in 0..LANES { given_17[l] = wrenches.get(1, l); }
+        for l in 0..LANES { given_18[l] = wrenches.get(2, l); }
+        for l in 0..LANES { given_19[l] = wrenches.get(3, l); }
+        for l in 0..LANES { given_20[l] = wrenches.get(4, l); }
+        for l in 0..LANES { given_21[l] = wrenches.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let tau_0 = given[6][l];
-            let tau_1 = given[7][l];
-            let tau_2 = given[8][l];
-            let tau_3 = given[9][l];
-            let tau_4 = given[10][l];
-            let tau_5 = given[11][l];
-            let drive_v_0 = given[12][l];
-            let drive_v_1 = given[13][l];
-            let drive_a_0 = given[14][l];
-            let drive_a_1 = given[15][l];
-            let wrenches_0 = given[16][l];
-            let wrenches_1 = given[17][l];
-            let wrenches_2 = given[18][l];
-            let wrenches_3 = given[19][l];
-            let wrenches_4 = given[20][l];
-            let wrenches_5 = given[21][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let tau_0 = given_6[l];
+            let tau_1 = given_7[l];
+            let tau_2 = given_8[l];
+            let tau_3 = given_9[l];
+            let tau_4 = given_10[l];
+            let tau_5 = given_11[l];
+            let drive_v_0 = given_12[l];
+            let drive_v_1 = given_13[l];
+            let drive_a_0 = given_14[l];
+            let drive_a_1 = given_15[l];
+            let wrenches_0 = given_16[l];
+            let wrenches_1 = given_17[l];
+            let wrenches_2 = given_18[l];
+            let wrenches_3 = given_19[l];
+            let wrenches_4 = given_20[l];
+            let wrenches_5 = given_21[l];
             // panel_left: sine and cosine, rotation
             let panel_left_sin = sines[0][l];
             let panel_left_cos = cosines[0][l];
@@ -2302,34 +2433,34 @@ impl Satellite {
             let minus_reactions_2_3 = panel_right_minus_f_rx + panel_right_t153;
             let panel_right_t154 = 0.6 * panel_right_minus_f_x_2;
             let reactions_2_5 = panel_right_minus_f_ry_2 + panel_right_t154;
-            results[0][l] = -minus_reactions_0_0;
-            results[1][l] = reactions_0_1;
-            results[2][l] = reactions_0_2;
-            results[3][l] = -minus_reactions_0_3;
-            results[4][l] = -minus_reactions_0_4;
-            results[5][l] = reactions_0_5;
-            results[6][l] = -panel_left_minus_f_x_2;
-            results[7][l] = panel_left_f_z_2;
-            results[8][l] = -panel_left_f_y_2;
-            results[9][l] = reactions_1_3;
-            results[10][l] = -panel_left_minus_f_rz;
-            results[11][l] = -minus_reactions_1_5;
-            results[12][l] = -panel_right_minus_f_x_2;
-            results[13][l] = panel_right_f_z_2;
-            results[14][l] = -panel_right_f_y_2;
-            results[15][l] = -minus_reactions_2_3;
-            results[16][l] = -panel_right_minus_f_rz;
-            results[17][l] = reactions_2_5;
+            result_0[l] = -minus_reactions_0_0;
+            result_1[l] = reactions_0_1;
+            result_2[l] = reactions_0_2;
+            result_3[l] = -minus_reactions_0_3;
+            result_4[l] = -minus_reactions_0_4;
+            result_5[l] = reactions_0_5;
+            result_6[l] = -panel_left_minus_f_x_2;
+            result_7[l] = panel_left_f_z_2;
+            result_8[l] = -panel_left_f_y_2;
+            result_9[l] = reactions_1_3;
+            result_10[l] = -panel_left_minus_f_rz;
+            result_11[l] = -minus_reactions_1_5;
+            result_12[l] = -panel_right_minus_f_x_2;
+            result_13[l] = panel_right_f_z_2;
+            result_14[l] = -panel_right_f_y_2;
+            result_15[l] = -minus_reactions_2_3;
+            result_16[l] = -panel_right_minus_f_rz;
+            result_17[l] = reactions_2_5;
         }
-        reactions.give_pair(0, [&results[0], &results[1]]);
-        reactions.give_pair(2, [&results[2], &results[3]]);
-        reactions.give_pair(4, [&results[4], &results[5]]);
-        reactions.give_pair(6, [&results[6], &results[7]]);
-        reactions.give_pair(8, [&results[8], &results[9]]);
-        reactions.give_pair(10, [&results[10], &results[11]]);
-        reactions.give_pair(12, [&results[12], &results[13]]);
-        reactions.give_pair(14, [&results[14], &results[15]]);
-        reactions.give_pair(16, [&results[16], &results[17]]);
+        reactions.give_pair(0, [&result_0, &result_1]);
+        reactions.give_pair(2, [&result_2, &result_3]);
+        reactions.give_pair(4, [&result_4, &result_5]);
+        reactions.give_pair(6, [&result_6, &result_7]);
+        reactions.give_pair(8, [&result_8, &result_9]);
+        reactions.give_pair(10, [&result_10, &result_11]);
+        reactions.give_pair(12, [&result_12, &result_13]);
+        reactions.give_pair(14, [&result_14, &result_15]);
+        reactions.give_pair(16, [&result_16, &result_17]);
     }
 
     /// Mass matrix, by rows.
@@ -2349,7 +2480,42 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 36]);
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
+        let mut result_18 = [0.0; LANES];
+        let mut result_19 = [0.0; LANES];
+        let mut result_20 = [0.0; LANES];
+        let mut result_21 = [0.0; LANES];
+        let mut result_22 = [0.0; LANES];
+        let mut result_23 = [0.0; LANES];
+        let mut result_24 = [0.0; LANES];
+        let mut result_25 = [0.0; LANES];
+        let mut result_26 = [0.0; LANES];
+        let mut result_27 = [0.0; LANES];
+        let mut result_28 = [0.0; LANES];
+        let mut result_29 = [0.0; LANES];
+        let mut result_30 = [0.0; LANES];
+        let mut result_31 = [0.0; LANES];
+        let mut result_32 = [0.0; LANES];
+        let mut result_33 = [0.0; LANES];
+        let mut result_34 = [0.0; LANES];
+        let mut result_35 = [0.0; LANES];
         for l in 0..LANES {
             // panel_left: sine and cosine, rotation
             let panel_left_sin = sines[0][l];
@@ -2421,61 +2587,61 @@ impl Satellite {
             let minus_m_4_4 = panel_right_t28 + panel_left_t22;
             let m_4_5 = panel_left_t7 - panel_right_t29;
             let minus_m_5_5 = panel_right_t30 + panel_left_t16;
-            results[0][l] = 138.0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = 0.0;
-            results[4][l] = -minus_m_0_4;
-            results[5][l] = 1.1999999999999993;
-            results[6][l] = 0.0;
-            results[7][l] = 138.0;
-            results[8][l] = 0.0;
-            results[9][l] = minus_m_0_4;
-            results[10][l] = 0.0;
-            results[11][l] = m_1_5;
-            results[12][l] = 0.0;
-            results[13][l] = 0.0;
-            results[14][l] = 138.0;
-            results[15][l] = -1.1999999999999993;
-            results[16][l] = -m_1_5;
-            results[17][l] = 0.0;
-            results[18][l] = 0.0;
-            results[19][l] = minus_m_0_4;
-            results[20][l] = -1.1999999999999993;
-            results[21][l] = m_3_3;
-            results[22][l] = m_3_4;
-            results[23][l] = m_3_5;
-            results[24][l] = -minus_m_0_4;
-            results[25][l] = 0.0;
-            results[26][l] = -m_1_5;
-            results[27][l] = m_3_4;
-            results[28][l] = -minus_m_4_4;
-            results[29][l] = m_4_5;
-            results[30][l] = 1.1999999999999993;
-            results[31][l] = m_1_5;
-            results[32][l] = 0.0;
-            results[33][l] = m_3_5;
-            results[34][l] = m_4_5;
-            results[35][l] = -minus_m_5_5;
+            result_0[l] = 138.0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = 0.0;
+            result_4[l] = -minus_m_0_4;
+            result_5[l] = 1.1999999999999993;
+            result_6[l] = 0.0;
+            result_7[l] = 138.0;
+            result_8[l] = 0.0;
+            result_9[l] = minus_m_0_4;
+            result_10[l] = 0.0;
+            result_11[l] = m_1_5;
+            result_12[l] = 0.0;
+            result_13[l] = 0.0;
+            result_14[l] = 138.0;
+            result_15[l] = -1.1999999999999993;
+            result_16[l] = -m_1_5;
+            result_17[l] = 0.0;
+            result_18[l] = 0.0;
+            result_19[l] = minus_m_0_4;
+            result_20[l] = -1.1999999999999993;
+            result_21[l] = m_3_3;
+            result_22[l] = m_3_4;
+            result_23[l] = m_3_5;
+            result_24[l] = -minus_m_0_4;
+            result_25[l] = 0.0;
+            result_26[l] = -m_1_5;
+            result_27[l] = m_3_4;
+            result_28[l] = -minus_m_4_4;
+            result_29[l] = m_4_5;
+            result_30[l] = 1.1999999999999993;
+            result_31[l] = m_1_5;
+            result_32[l] = 0.0;
+            result_33[l] = m_3_5;
+            result_34[l] = m_4_5;
+            result_35[l] = -minus_m_5_5;
         }
-        m.give_pair(0, [&results[0], &results[1]]);
-        m.give_pair(2, [&results[2], &results[3]]);
-        m.give_pair(4, [&results[4], &results[5]]);
-        m.give_pair(6, [&results[6], &results[7]]);
-        m.give_pair(8, [&results[8], &results[9]]);
-        m.give_pair(10, [&results[10], &results[11]]);
-        m.give_pair(12, [&results[12], &results[13]]);
-        m.give_pair(14, [&results[14], &results[15]]);
-        m.give_pair(16, [&results[16], &results[17]]);
-        m.give_pair(18, [&results[18], &results[19]]);
-        m.give_pair(20, [&results[20], &results[21]]);
-        m.give_pair(22, [&results[22], &results[23]]);
-        m.give_pair(24, [&results[24], &results[25]]);
-        m.give_pair(26, [&results[26], &results[27]]);
-        m.give_pair(28, [&results[28], &results[29]]);
-        m.give_pair(30, [&results[30], &results[31]]);
-        m.give_pair(32, [&results[32], &results[33]]);
-        m.give_pair(34, [&results[34], &results[35]]);
+        m.give_pair(0, [&result_0, &result_1]);
+        m.give_pair(2, [&result_2, &result_3]);
+        m.give_pair(4, [&result_4, &result_5]);
+        m.give_pair(6, [&result_6, &result_7]);
+        m.give_pair(8, [&result_8, &result_9]);
+        m.give_pair(10, [&result_10, &result_11]);
+        m.give_pair(12, [&result_12, &result_13]);
+        m.give_pair(14, [&result_14, &result_15]);
+        m.give_pair(16, [&result_16, &result_17]);
+        m.give_pair(18, [&result_18, &result_19]);
+        m.give_pair(20, [&result_20, &result_21]);
+        m.give_pair(22, [&result_22, &result_23]);
+        m.give_pair(24, [&result_24, &result_25]);
+        m.give_pair(26, [&result_26, &result_27]);
+        m.give_pair(28, [&result_28, &result_29]);
+        m.give_pair(30, [&result_30, &result_31]);
+        m.give_pair(32, [&result_32, &result_33]);
+        m.give_pair(34, [&result_34, &result_35]);
     }
 
     /// Rotation, position and velocity of frames. The rotation takes components in the frame's axes to ground axes; the
@@ -2497,39 +2663,106 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 15]);
-        for l in 0..LANES { given[0][l] = q.get(0, l); }
-        for l in 0..LANES { given[1][l] = q.get(1, l); }
-        for l in 0..LANES { given[2][l] = q.get(2, l); }
-        for l in 0..LANES { given[3][l] = q.get(3, l); }
-        for l in 0..LANES { given[4][l] = q.get(4, l); }
-        for l in 0..LANES { given[5][l] = q.get(5, l); }
-        for l in 0..LANES { given[6][l] = q.get(6, l); }
-        for l in 0..LANES { given[7][l] = v.get(0, l); }
-        for l in 0..LANES { given[8][l] = v.get(1, l); }
-        for l in 0..LANES { given[9][l] = v.get(2, l); }
-        for l in 0..LANES { given[10][l] = v.get(3, l); }
-        for l in 0..LANES { given[11][l] = v.get(4, l); }
-        for l in 0..LANES { given[12][l] = v.get(5, l); }
-        for l in 0..LANES { given[13][l] = drive_v.get(0, l); }
-        for l in 0..LANES { given[14][l] = drive_v.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 54]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(0, l); }
+        for l in 0..LANES { given_1[l] = q.get(1, l); }
+        for l in 0..LANES { given_2[l] = q.get(2, l); }
+        for l in 0..LANES { given_3[l] = q.get(3, l); }
+        for l in 0..LANES { given_4[l] = q.get(4, l); }
+        for l in 0..LANES { given_5[l] = q.get(5, l); }
+        for l in 0..LANES { given_6[l] = q.get(6, l); }
+        for l in 0..LANES { given_7[l] = v.get(0, l); }
+        for l in 0..LANES { given_8[l] = v.get(1, l); }
+        for l in 0..LANES { given_9[l] = v.get(2, l); }
+        for l in 0..LANES { given_10[l] = v.get(3, l); }
+        for l in 0..LANES { given_11[l] = v.get(4, l); }
+        for l in 0..LANES { given_12[l] = v.get(5, l); }
+        for l in 0..LANES { given_13[l] = drive_v.get(0, l); }
+        for l in 0..LANES { given_14[l] = drive_v.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
+        let mut result_18 = [0.0; LANES];
+        let mut result_19 = [0.0; LANES];
+        let mut result_20 = [0.0; LANES];
+        let mut result_21 = [0.0; LANES];
+        let mut result_22 = [0.0; LANES];
+        let mut result_23 = [0.0; LANES];
+        let mut result_24 = [0.0; LANES];
+        let mut result_25 = [0.0; LANES];
+        let mut result_26 = [0.0; LANES];
+        let mut result_27 = [0.0; LANES];
+        let mut result_28 = [0.0; LANES];
+        let mut result_29 = [0.0; LANES];
+        let mut result_30 = [0.0; LANES];
+        let mut result_31 = [0.0; LANES];
+        let mut result_32 = [0.0; LANES];
+        let mut result_33 = [0.0; LANES];
+        let mut result_34 = [0.0; LANES];
+        let mut result_35 = [0.0; LANES];
+        let mut result_36 = [0.0; LANES];
+        let mut result_37 = [0.0; LANES];
+        let mut result_38 = [0.0; LANES];
+        let mut result_39 = [0.0; LANES];
+        let mut result_40 = [0.0; LANES];
+        let mut result_41 = [0.0; LANES];
+        let mut result_42 = [0.0; LANES];
+        let mut result_43 = [0.0; LANES];
+        let mut result_44 = [0.0; LANES];
+        let mut result_45 = [0.0; LANES];
+        let mut result_46 = [0.0; LANES];
+        let mut result_47 = [0.0; LANES];
+        let mut result_48 = [0.0; LANES];
+        let mut result_49 = [0.0; LANES];
+        let mut result_50 = [0.0; LANES];
+        let mut result_51 = [0.0; LANES];
+        let mut result_52 = [0.0; LANES];
+        let mut result_53 = [0.0; LANES];
         for l in 0..LANES {
-            let q_0 = given[0][l];
-            let q_1 = given[1][l];
-            let q_2 = given[2][l];
-            let q_3 = given[3][l];
-            let q_4 = given[4][l];
-            let q_5 = given[5][l];
-            let q_6 = given[6][l];
-            let v_0 = given[7][l];
-            let v_1 = given[8][l];
-            let v_2 = given[9][l];
-            let v_3 = given[10][l];
-            let v_4 = given[11][l];
-            let v_5 = given[12][l];
-            let drive_v_0 = given[13][l];
-            let drive_v_1 = given[14][l];
+            let q_0 = given_0[l];
+            let q_1 = given_1[l];
+            let q_2 = given_2[l];
+            let q_3 = given_3[l];
+            let q_4 = given_4[l];
+            let q_5 = given_5[l];
+            let q_6 = given_6[l];
+            let v_0 = given_7[l];
+            let v_1 = given_8[l];
+            let v_2 = given_9[l];
+            let v_3 = given_10[l];
+            let v_4 = given_11[l];
+            let v_5 = given_12[l];
+            let drive_v_0 = given_13[l];
+            let drive_v_1 = given_14[l];
             // bus: sine and cosine, rotation
             let bus_t0 = q_3 + q_3;
             let bus_t1 = q_4 + q_4;
@@ -2666,89 +2899,89 @@ impl Satellite {
             let velocity_2_0 = panel_right_hat_x + panel_right_t20;
             let panel_right_t21 = 0.6 * panel_right_hat_rx;
             let velocity_2_2 = panel_right_minus_hat_y - panel_right_t21;
-            results[0][l] = -minus_rotation_0_0;
-            results[1][l] = rotation_0_1;
-            results[2][l] = rotation_0_2;
-            results[3][l] = rotation_1_0;
-            results[4][l] = -minus_rotation_1_1;
-            results[5][l] = rotation_1_2;
-            results[6][l] = rotation_2_0;
-            results[7][l] = rotation_2_1;
-            results[8][l] = -minus_rotation_2_2;
-            results[9][l] = -minus_rotation_3_0;
-            results[10][l] = rotation_0_1;
-            results[11][l] = rotation_3_2;
-            results[12][l] = rotation_4_0;
-            results[13][l] = -minus_rotation_1_1;
-            results[14][l] = rotation_4_2;
-            results[15][l] = rotation_5_0;
-            results[16][l] = rotation_2_1;
-            results[17][l] = rotation_5_2;
-            results[18][l] = -minus_rotation_6_0;
-            results[19][l] = rotation_0_1;
-            results[20][l] = rotation_6_2;
-            results[21][l] = rotation_7_0;
-            results[22][l] = -minus_rotation_1_1;
-            results[23][l] = rotation_7_2;
-            results[24][l] = rotation_8_0;
-            results[25][l] = rotation_2_1;
-            results[26][l] = rotation_8_2;
-            results[27][l] = q_0;
-            results[28][l] = q_1;
-            results[29][l] = q_2;
-            results[30][l] = position_1_0;
-            results[31][l] = position_1_1;
-            results[32][l] = position_1_2;
-            results[33][l] = position_2_0;
-            results[34][l] = position_2_1;
-            results[35][l] = position_2_2;
-            results[36][l] = v_0;
-            results[37][l] = v_1;
-            results[38][l] = v_2;
-            results[39][l] = v_3;
-            results[40][l] = v_4;
-            results[41][l] = v_5;
-            results[42][l] = velocity_1_0;
-            results[43][l] = panel_left_hat_z;
-            results[44][l] = velocity_1_2;
-            results[45][l] = panel_left_hat_rx;
-            results[46][l] = panel_left_omega_rz;
-            results[47][l] = panel_left_minus_hat_ry;
-            results[48][l] = velocity_2_0;
-            results[49][l] = panel_left_hat_z;
-            results[50][l] = velocity_2_2;
-            results[51][l] = panel_right_hat_rx;
-            results[52][l] = panel_right_omega_rz;
-            results[53][l] = panel_right_minus_hat_ry;
+            result_0[l] = -minus_rotation_0_0;
+            result_1[l] = rotation_0_1;
+            result_2[l] = rotation_0_2;
+            result_3[l] = rotation_1_0;
+            result_4[l] = -minus_rotation_1_1;
+            result_5[l] = rotation_1_2;
+            result_6[l] = rotation_2_0;
+            result_7[l] = rotation_2_1;
+            result_8[l] = -minus_rotation_2_2;
+            result_9[l] = -minus_rotation_3_0;
+            result_10[l] = rotation_0_1;
+            result_11[l] = rotation_3_2;
+            result_12[l] = rotation_4_0;
+            result_13[l] = -minus_rotation_1_1;
+            result_14[l] = rotation_4_2;
+            result_15[l] = rotation_5_0;
+            result_16[l] = rotation_2_1;
+            result_17[l] = rotation_5_2;
+            result_18[l] = -minus_rotation_6_0;
+            result_19[l] = rotation_0_1;
+            result_20[l] = rotation_6_2;
+            result_21[l] = rotation_7_0;
+            result_22[l] = -minus_rotation_1_1;
+            result_23[l] = rotation_7_2;
+            result_24[l] = rotation_8_0;
+            result_25[l] = rotation_2_1;
+            result_26[l] = rotation_8_2;
+            result_27[l] = q_0;
+            result_28[l] = q_1;
+            result_29[l] = q_2;
+            result_30[l] = position_1_0;
+            result_31[l] = position_1_1;
+            result_32[l] = position_1_2;
+            result_33[l] = position_2_0;
+            result_34[l] = position_2_1;
+            result_35[l] = position_2_2;
+            result_36[l] = v_0;
+            result_37[l] = v_1;
+            result_38[l] = v_2;
+            result_39[l] = v_3;
+            result_40[l] = v_4;
+            result_41[l] = v_5;
+            result_42[l] = velocity_1_0;
+            result_43[l] = panel_left_hat_z;
+            result_44[l] = velocity_1_2;
+            result_45[l] = panel_left_hat_rx;
+            result_46[l] = panel_left_omega_rz;
+            result_47[l] = panel_left_minus_hat_ry;
+            result_48[l] = velocity_2_0;
+            result_49[l] = panel_left_hat_z;
+            result_50[l] = velocity_2_2;
+            result_51[l] = panel_right_hat_rx;
+            result_52[l] = panel_right_omega_rz;
+            result_53[l] = panel_right_minus_hat_ry;
         }
-        rotation.give_pair(0, [&results[0], &results[1]]);
-        rotation.give_pair(2, [&results[2], &results[3]]);
-        rotation.give_pair(4, [&results[4], &results[5]]);
-        rotation.give_pair(6, [&results[6], &results[7]]);
-        rotation.give_pair(8, [&results[8], &results[9]]);
-        rotation.give_pair(10, [&results[10], &results[11]]);
-        rotation.give_pair(12, [&results[12], &results[13]]);
-        rotation.give_pair(14, [&results[14], &results[15]]);
-        rotation.give_pair(16, [&results[16], &results[17]]);
-        rotation.give_pair(18, [&results[18], &results[19]]);
-        rotation.give_pair(20, [&results[20], &results[21]]);
-        rotation.give_pair(22, [&results[22], &results[23]]);
-        rotation.give_pair(24, [&results[24], &results[25]]);
-        rotation.give(26, &results[26]);
-        position.give_pair(0, [&results[27], &results[28]]);
-        position.give_pair(2, [&results[29], &results[30]]);
-        position.give_pair(4, [&results[31], &results[32]]);
-        position.give_pair(6, [&results[33], &results[34]]);
-        position.give(8, &results[35]);
-        velocity.give_pair(0, [&results[36], &results[37]]);
-        velocity.give_pair(2, [&results[38], &results[39]]);
-        velocity.give_pair(4, [&results[40], &results[41]]);
-        velocity.give_pair(6, [&results[42], &results[43]]);
-        velocity.give_pair(8, [&results[44], &results[45]]);
-        velocity.give_pair(10, [&results[46], &results[47]]);
-        velocity.give_pair(12, [&results[48], &results[49]]);
-        velocity.give_pair(14, [&results[50], &results[51]]);
-        velocity.give_pair(16, [&results[52], &results[53]]);
+        rotation.give_pair(0, [&result_0, &result_1]);
+        rotation.give_pair(2, [&result_2, &result_3]);
+        rotation.give_pair(4, [&result_4, &result_5]);
+        rotation.give_pair(6, [&result_6, &result_7]);
+        rotation.give_pair(8, [&result_8, &result_9]);
+        rotation.give_pair(10, [&result_10, &result_11]);
+        rotation.give_pair(12, [&result_12, &result_13]);
+        rotation.give_pair(14, [&result_14, &result_15]);
+        rotation.give_pair(16, [&result_16, &result_17]);
+        rotation.give_pair(18, [&result_18, &result_19]);
+        rotation.give_pair(20, [&result_20, &result_21]);
+        rotation.give_pair(22, [&result_22, &result_23]);
+        rotation.give_pair(24, [&result_24, &result_25]);
+        rotation.give(26, &result_26);
+        position.give_pair(0, [&result_27, &result_28]);
+        position.give_pair(2, [&result_29, &result_30]);
+        position.give_pair(4, [&result_31, &result_32]);
+        position.give_pair(6, [&result_33, &result_34]);
+        position.give(8, &result_35);
+        velocity.give_pair(0, [&result_36, &result_37]);
+        velocity.give_pair(2, [&result_38, &result_39]);
+        velocity.give_pair(4, [&result_40, &result_41]);
+        velocity.give_pair(6, [&result_42, &result_43]);
+        velocity.give_pair(8, [&result_44, &result_45]);
+        velocity.give_pair(10, [&result_46, &result_47]);
+        velocity.give_pair(12, [&result_48, &result_49]);
+        velocity.give_pair(14, [&result_50, &result_51]);
+        velocity.give_pair(16, [&result_52, &result_53]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`.
@@ -2769,53 +3002,79 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 22]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = a.get(0, l); }
-        for l in 0..LANES { given[7][l] = a.get(1, l); }
-        for l in 0..LANES { given[8][l] = a.get(2, l); }
-        for l in 0..LANES { given[9][l] = a.get(3, l); }
-        for l in 0..LANES { given[10][l] = a.get(4, l); }
-        for l in 0..LANES { given[11][l] = a.get(5, l); }
-        for l in 0..LANES { given[12][l] = drive_v.get(0, l); }
-        for l in 0..LANES { given[13][l] = drive_v.get(1, l); }
-        for l in 0..LANES { given[14][l] = drive_a.get(0, l); }
-        for l in 0..LANES { given[15][l] = drive_a.get(1, l); }
-        for l in 0..LANES { given[16][l] = wrenches.get(0, l); }
-        for l in 0..LANES { given[17][l] = wrenches.get(1, l); }
-        for l in 0..LANES { given[18][l] = wrenches.get(2, l); }
-        for l in 0..LANES { given[19][l] = wrenches.get(3, l); }
-        for l in 0..LANES { given[20][l] = wrenches.get(4, l); }
-        for l in 0..LANES { given[21][l] = wrenches.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        let mut given_18 = [0.0; LANES];
+        let mut given_19 = [0.0; LANES];
+        let mut given_20 = [0.0; LANES];
+        let mut given_21 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = a.get(0, l); }
+        for l in 0..LANES { given_7[l] = a.get(1, l); }
+        for l in 0..LANES { given_8[l] = a.get(2, l); }
+        for l in 0..LANES { given_9[l] = a.get(3, l); }
+        for l in 0..LANES { given_10[l] = a.get(4, l); }
+        for l in 0..LANES { given_11[l] = a.get(5, l); }
+        for l in 0..LANES { given_12[l] = drive_v.get(0, l); }
+        for l in 0..LANES { given_13[l] = drive_v.get(1, l); }
+        for l in 0..LANES { given_14[l] = drive_a.get(0, l); }
+        for l in 0..LANES { given_15[l] = drive_a.get(1, l); }
+        for l in 0..LANES { given_16[l] = wrenches.get(0, l); }
+        for l in 0..LANES { given_17[l] = wrenches.get(1, l); }
+        for l in 0..LANES { given_18[l] = wrenches.get(2, l); }
+        for l in 0..LANES { given_19[l] = wrenches.get(3, l); }
+        for l in 0..LANES { given_20[l] = wrenches.get(4, l); }
+        for l in 0..LANES { given_21[l] = wrenches.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let a_0 = given[6][l];
-            let a_1 = given[7][l];
-            let a_2 = given[8][l];
-            let a_3 = given[9][l];
-            let a_4 = given[10][l];
-            let a_5 = given[11][l];
-            let drive_v_0 = given[12][l];
-            let drive_v_1 = given[13][l];
-            let drive_a_0 = given[14][l];
-            let drive_a_1 = given[15][l];
-            let wrenches_0 = given[16][l];
-            let wrenches_1 = given[17][l];
-            let wrenches_2 = given[18][l];
-            let wrenches_3 = given[19][l];
-            let wrenches_4 = given[20][l];
-            let wrenches_5 = given[21][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let a_0 = given_6[l];
+            let a_1 = given_7[l];
+            let a_2 = given_8[l];
+            let a_3 = given_9[l];
+            let a_4 = given_10[l];
+            let a_5 = given_11[l];
+            let drive_v_0 = given_12[l];
+            let drive_v_1 = given_13[l];
+            let drive_a_0 = given_14[l];
+            let drive_a_1 = given_15[l];
+            let wrenches_0 = given_16[l];
+            let wrenches_1 = given_17[l];
+            let wrenches_2 = given_18[l];
+            let wrenches_3 = given_19[l];
+            let wrenches_4 = given_20[l];
+            let wrenches_5 = given_21[l];
             // panel_left: sine and cosine, rotation
             let panel_left_sin = sines[0][l];
             let panel_left_cos = cosines[0][l];
@@ -3094,16 +3353,16 @@ impl Satellite {
             let minus_tau_3 = panel_right_t61 + panel_left_t79;
             let tau_4 = panel_left_t81 - panel_right_t62;
             let tau_5 = panel_left_t77 - panel_right_t63;
-            results[0][l] = -minus_tau_0;
-            results[1][l] = tau_1;
-            results[2][l] = tau_2;
-            results[3][l] = -minus_tau_3;
-            results[4][l] = tau_4;
-            results[5][l] = tau_5;
+            result_0[l] = -minus_tau_0;
+            result_1[l] = tau_1;
+            result_2[l] = tau_2;
+            result_3[l] = -minus_tau_3;
+            result_4[l] = tau_4;
+            result_5[l] = tau_5;
         }
-        tau.give_pair(0, [&results[0], &results[1]]);
-        tau.give_pair(2, [&results[2], &results[3]]);
-        tau.give_pair(4, [&results[4], &results[5]]);
+        tau.give_pair(0, [&result_0, &result_1]);
+        tau.give_pair(2, [&result_2, &result_3]);
+        tau.give_pair(4, [&result_4, &result_5]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`.
@@ -3124,41 +3383,61 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 16]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = drive_v.get(0, l); }
-        for l in 0..LANES { given[7][l] = drive_v.get(1, l); }
-        for l in 0..LANES { given[8][l] = drive_a.get(0, l); }
-        for l in 0..LANES { given[9][l] = drive_a.get(1, l); }
-        for l in 0..LANES { given[10][l] = wrenches.get(0, l); }
-        for l in 0..LANES { given[11][l] = wrenches.get(1, l); }
-        for l in 0..LANES { given[12][l] = wrenches.get(2, l); }
-        for l in 0..LANES { given[13][l] = wrenches.get(3, l); }
-        for l in 0..LANES { given[14][l] = wrenches.get(4, l); }
-        for l in 0..LANES { given[15][l] = wrenches.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = drive_v.get(0, l); }
+        for l in 0..LANES { given_7[l] = drive_v.get(1, l); }
+        for l in 0..LANES { given_8[l] = drive_a.get(0, l); }
+        for l in 0..LANES { given_9[l] = drive_a.get(1, l); }
+        for l in 0..LANES { given_10[l] = wrenches.get(0, l); }
+        for l in 0..LANES { given_11[l] = wrenches.get(1, l); }
+        for l in 0..LANES { given_12[l] = wrenches.get(2, l); }
+        for l in 0..LANES { given_13[l] = wrenches.get(3, l); }
+        for l in 0..LANES { given_14[l] = wrenches.get(4, l); }
+        for l in 0..LANES { given_15[l] = wrenches.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let drive_v_0 = given[6][l];
-            let drive_v_1 = given[7][l];
-            let drive_a_0 = given[8][l];
-            let drive_a_1 = given[9][l];
-            let wrenches_0 = given[10][l];
-            let wrenches_1 = given[11][l];
-            let wrenches_2 = given[12][l];
-            let wrenches_3 = given[13][l];
-            let wrenches_4 = given[14][l];
-            let wrenches_5 = given[15][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let drive_v_0 = given_6[l];
+            let drive_v_1 = given_7[l];
+            let drive_a_0 = given_8[l];
+            let drive_a_1 = given_9[l];
+            let wrenches_0 = given_10[l];
+            let wrenches_1 = given_11[l];
+            let wrenches_2 = given_12[l];
+            let wrenches_3 = given_13[l];
+            let wrenches_4 = given_14[l];
+            let wrenches_5 = given_15[l];
             // panel_left: sine and cosine, rotation
             let panel_left_sin = sines[0][l];
             let panel_left_cos = cosines[0][l];
@@ -3404,16 +3683,16 @@ impl Satellite {
             let h_3 = panel_left_t67 - panel_right_t53;
             let h_4 = panel_left_t69 - panel_right_t54;
             let minus_h_5 = panel_right_t55 + panel_left_t65;
-            results[0][l] = -minus_h_0;
-            results[1][l] = h_1;
-            results[2][l] = h_2;
-            results[3][l] = h_3;
-            results[4][l] = h_4;
-            results[5][l] = -minus_h_5;
+            result_0[l] = -minus_h_0;
+            result_1[l] = h_1;
+            result_2[l] = h_2;
+            result_3[l] = h_3;
+            result_4[l] = h_4;
+            result_5[l] = -minus_h_5;
         }
-        h.give_pair(0, [&results[0], &results[1]]);
-        h.give_pair(2, [&results[2], &results[3]]);
-        h.give_pair(4, [&results[4], &results[5]]);
+        h.give_pair(0, [&result_0, &result_1]);
+        h.give_pair(2, [&result_2, &result_3]);
+        h.give_pair(4, [&result_4, &result_5]);
     }
 
     /// Jacobians `J` of frames.
@@ -3434,7 +3713,114 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 108]);
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
+        let mut result_18 = [0.0; LANES];
+        let mut result_19 = [0.0; LANES];
+        let mut result_20 = [0.0; LANES];
+        let mut result_21 = [0.0; LANES];
+        let mut result_22 = [0.0; LANES];
+        let mut result_23 = [0.0; LANES];
+        let mut result_24 = [0.0; LANES];
+        let mut result_25 = [0.0; LANES];
+        let mut result_26 = [0.0; LANES];
+        let mut result_27 = [0.0; LANES];
+        let mut result_28 = [0.0; LANES];
+        let mut result_29 = [0.0; LANES];
+        let mut result_30 = [0.0; LANES];
+        let mut result_31 = [0.0; LANES];
+        let mut result_32 = [0.0; LANES];
+        let mut result_33 = [0.0; LANES];
+        let mut result_34 = [0.0; LANES];
+        let mut result_35 = [0.0; LANES];
+        let mut result_36 = [0.0; LANES];
+        let mut result_37 = [0.0; LANES];
+        let mut result_38 = [0.0; LANES];
+        let mut result_39 = [0.0; LANES];
+        let mut result_40 = [0.0; LANES];
+        let mut result_41 = [0.0; LANES];
+        let mut result_42 = [0.0; LANES];
+        let mut result_43 = [0.0; LANES];
+        let mut result_44 = [0.0; LANES];
+        let mut result_45 = [0.0; LANES];
+        let mut result_46 = [0.0; LANES];
+        let mut result_47 = [0.0; LANES];
+        let mut result_48 = [0.0; LANES];
+        let mut result_49 = [0.0; LANES];
+        let mut result_50 = [0.0; LANES];
+        let mut result_51 = [0.0; LANES];
+        let mut result_52 = [0.0; LANES];
+        let mut result_53 = [0.0; LANES];
+        let mut result_54 = [0.0; LANES];
+        let mut result_55 = [0.0; LANES];
+        let mut result_56 = [0.0; LANES];
+        let mut result_57 = [0.0; LANES];
+        let mut result_58 = [0.0; LANES];
+        let mut result_59 = [0.0; LANES];
+        let mut result_60 = [0.0; LANES];
+        let mut result_61 = [0.0; LANES];
+        let mut result_62 = [0.0; LANES];
+        let mut result_63 = [0.0; LANES];
+        let mut result_64 = [0.0; LANES];
+        let mut result_65 = [0.0; LANES];
+        let mut result_66 = [0.0; LANES];
+        let mut result_67 = [0.0; LANES];
+        let mut result_68 = [0.0; LANES];
+        let mut result_69 = [0.0; LANES];
+        let mut result_70 = [0.0; LANES];
+        let mut result_71 = [0.0; LANES];
+        let mut result_72 = [0.0; LANES];
+        let mut result_73 = [0.0; LANES];
+        let mut result_74 = [0.0; LANES];
+        let mut result_75 = [0.0; LANES];
+        let mut result_76 = [0.0; LANES];
+        let mut result_77 = [0.0; LANES];
+        let mut result_78 = [0.0; LANES];
+        let mut result_79 = [0.0; LANES];
+        let mut result_80 = [0.0; LANES];
+        let mut result_81 = [0.0; LANES];
+        let mut result_82 = [0.0; LANES];
+        let mut result_83 = [0.0; LANES];
+        let mut result_84 = [0.0; LANES];
+        let mut result_85 = [0.0; LANES];
+        let mut result_86 = [0.0; LANES];
+        let mut result_87 = [0.0; LANES];
+        let mut result_88 = [0.0; LANES];
+        let mut result_89 = [0.0; LANES];
+        let mut result_90 = [0.0; LANES];
+        let mut result_91 = [0.0; LANES];
+        let mut result_92 = [0.0; LANES];
+        let mut result_93 = [0.0; LANES];
+        let mut result_94 = [0.0; LANES];
+        let mut result_95 = [0.0; LANES];
+        let mut result_96 = [0.0; LANES];
+        let mut result_97 = [0.0; LANES];
+        let mut result_98 = [0.0; LANES];
+        let mut result_99 = [0.0; LANES];
+        let mut result_100 = [0.0; LANES];
+        let mut result_101 = [0.0; LANES];
+        let mut result_102 = [0.0; LANES];
+        let mut result_103 = [0.0; LANES];
+        let mut result_104 = [0.0; LANES];
+        let mut result_105 = [0.0; LANES];
+        let mut result_106 = [0.0; LANES];
+        let mut result_107 = [0.0; LANES];
         for l in 0..LANES {
             // panel_left: sine and cosine, rotation
             let panel_left_sin = sines[0][l];
@@ -3459,169 +3845,169 @@ impl Satellite {
             let bus_t6 = 0.05 * panel_right_sin;
             let bus_t7 = 0.1 * panel_right_cos;
             let jacobian_14_4 = bus_t6 - bus_t7;
-            results[0][l] = 1.0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = 0.0;
-            results[4][l] = 0.0;
-            results[5][l] = 0.0;
-            results[6][l] = 0.0;
-            results[7][l] = 1.0;
-            results[8][l] = 0.0;
-            results[9][l] = 0.0;
-            results[10][l] = 0.0;
-            results[11][l] = 0.0;
-            results[12][l] = 0.0;
-            results[13][l] = 0.0;
-            results[14][l] = 1.0;
-            results[15][l] = 0.0;
-            results[16][l] = 0.0;
-            results[17][l] = 0.0;
-            results[18][l] = 0.0;
-            results[19][l] = 0.0;
-            results[20][l] = 0.0;
-            results[21][l] = 1.0;
-            results[22][l] = 0.0;
-            results[23][l] = 0.0;
-            results[24][l] = 0.0;
-            results[25][l] = 0.0;
-            results[26][l] = 0.0;
-            results[27][l] = 0.0;
-            results[28][l] = 1.0;
-            results[29][l] = 0.0;
-            results[30][l] = 0.0;
-            results[31][l] = 0.0;
-            results[32][l] = 0.0;
-            results[33][l] = 0.0;
-            results[34][l] = 0.0;
-            results[35][l] = 1.0;
-            results[36][l] = panel_left_cos;
-            results[37][l] = 0.0;
-            results[38][l] = -panel_left_sin;
-            results[39][l] = -minus_jacobian_6_3;
-            results[40][l] = jacobian_6_4;
-            results[41][l] = -minus_jacobian_6_5;
-            results[42][l] = 0.0;
-            results[43][l] = 1.0;
-            results[44][l] = 0.0;
-            results[45][l] = -0.05;
-            results[46][l] = 0.0;
-            results[47][l] = 0.1;
-            results[48][l] = panel_left_sin;
-            results[49][l] = 0.0;
-            results[50][l] = panel_left_cos;
-            results[51][l] = minus_jacobian_6_5;
-            results[52][l] = jacobian_8_4;
-            results[53][l] = -minus_jacobian_6_3;
-            results[54][l] = 0.0;
-            results[55][l] = 0.0;
-            results[56][l] = 0.0;
-            results[57][l] = panel_left_cos;
-            results[58][l] = 0.0;
-            results[59][l] = -panel_left_sin;
-            results[60][l] = 0.0;
-            results[61][l] = 0.0;
-            results[62][l] = 0.0;
-            results[63][l] = 0.0;
-            results[64][l] = 1.0;
-            results[65][l] = 0.0;
-            results[66][l] = 0.0;
-            results[67][l] = 0.0;
-            results[68][l] = 0.0;
-            results[69][l] = panel_left_sin;
-            results[70][l] = 0.0;
-            results[71][l] = panel_left_cos;
-            results[72][l] = panel_right_cos;
-            results[73][l] = 0.0;
-            results[74][l] = -panel_right_sin;
-            results[75][l] = jacobian_12_3;
-            results[76][l] = jacobian_12_4;
-            results[77][l] = jacobian_12_5;
-            results[78][l] = 0.0;
-            results[79][l] = 1.0;
-            results[80][l] = 0.0;
-            results[81][l] = -0.05;
-            results[82][l] = 0.0;
-            results[83][l] = 0.1;
-            results[84][l] = panel_right_sin;
-            results[85][l] = 0.0;
-            results[86][l] = panel_right_cos;
-            results[87][l] = -jacobian_12_5;
-            results[88][l] = jacobian_14_4;
-            results[89][l] = jacobian_12_3;
-            results[90][l] = 0.0;
-            results[91][l] = 0.0;
-            results[92][l] = 0.0;
-            results[93][l] = panel_right_cos;
-            results[94][l] = 0.0;
-            results[95][l] = -panel_right_sin;
-            results[96][l] = 0.0;
-            results[97][l] = 0.0;
-            results[98][l] = 0.0;
-            results[99][l] = 0.0;
-            results[100][l] = 1.0;
-            results[101][l] = 0.0;
-            results[102][l] = 0.0;
-            results[103][l] = 0.0;
-            results[104][l] = 0.0;
-            results[105][l] = panel_right_sin;
-            results[106][l] = 0.0;
-            results[107][l] = panel_right_cos;
+            result_0[l] = 1.0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = 0.0;
+            result_4[l] = 0.0;
+            result_5[l] = 0.0;
+            result_6[l] = 0.0;
+            result_7[l] = 1.0;
+            result_8[l] = 0.0;
+            result_9[l] = 0.0;
+            result_10[l] = 0.0;
+            result_11[l] = 0.0;
+            result_12[l] = 0.0;
+            result_13[l] = 0.0;
+            result_14[l] = 1.0;
+            result_15[l] = 0.0;
+            result_16[l] = 0.0;
+            result_17[l] = 0.0;
+            result_18[l] = 0.0;
+            result_19[l] = 0.0;
+            result_20[l] = 0.0;
+            result_21[l] = 1.0;
+            result_22[l] = 0.0;
+            result_23[l] = 0.0;
+            result_24[l] = 0.0;
+            result_25[l] = 0.0;
+            result_26[l] = 0.0;
+            result_27[l] = 0.0;
+            result_28[l] = 1.0;
+            result_29[l] = 0.0;
+            result_30[l] = 0.0;
+            result_31[l] = 0.0;
+            result_32[l] = 0.0;
+            result_33[l] = 0.0;
+            result_34[l] = 0.0;
+            result_35[l] = 1.0;
+            result_36[l] = panel_left_cos;
+            result_37[l] = 0.0;
+            result_38[l] = -panel_left_sin;
+            result_39[l] = -minus_jacobian_6_3;
+            result_40[l] = jacobian_6_4;
+            result_41[l] = -minus_jacobian_6_5;
+            result_42[l] = 0.0;
+            result_43[l] = 1.0;
+            result_44[l] = 0.0;
+            result_45[l] = -0.05;
+            result_46[l] = 0.0;
+            result_47[l] = 0.1;
+            result_48[l] = panel_left_sin;
+            result_49[l] = 0.0;
+            result_50[l] = panel_left_cos;
+            result_51[l] = minus_jacobian_6_5;
+            result_52[l] = jacobian_8_4;
+            result_53[l] = -minus_jacobian_6_3;
+            result_54[l] = 0.0;
+            result_55[l] = 0.0;
+            result_56[l] = 0.0;
+            result_57[l] = panel_left_cos;
+            result_58[l] = 0.0;
+            result_59[l] = -panel_left_sin;
+            result_60[l] = 0.0;
+            result_61[l] = 0.0;
+            result_62[l] = 0.0;
+            result_63[l] = 0.0;
+            result_64[l] = 1.0;
+            result_65[l] = 0.0;
+            result_66[l] = 0.0;
+            result_67[l] = 0.0;
+            result_68[l] = 0.0;
+            result_69[l] = panel_left_sin;
+            result_70[l] = 0.0;
+            result_71[l] = panel_left_cos;
+            result_72[l] = panel_right_cos;
+            result_73[l] = 0.0;
+            result_74[l] = -panel_right_sin;
+            result_75[l] = jacobian_12_3;
+            result_76[l] = jacobian_12_4;
+            result_77[l] = jacobian_12_5;
+            result_78[l] = 0.0;
+            result_79[l] = 1.0;
+            result_80[l] = 0.0;
+            result_81[l] = -0.05;
+            result_82[l] = 0.0;
+            result_83[l] = 0.1;
+            result_84[l] = panel_right_sin;
+            result_85[l] = 0.0;
+            result_86[l] = panel_right_cos;
+            result_87[l] = -jacobian_12_5;
+            result_88[l] = jacobian_14_4;
+            result_89[l] = jacobian_12_3;
+            result_90[l] = 0.0;
+            result_91[l] = 0.0;
+            result_92[l] = 0.0;
+            result_93[l] = panel_right_cos;
+            result_94[l] = 0.0;
+            result_95[l] = -panel_right_sin;
+            result_96[l] = 0.0;
+            result_97[l] = 0.0;
+            result_98[l] = 0.0;
+            result_99[l] = 0.0;
+            result_100[l] = 1.0;
+            result_101[l] = 0.0;
+            result_102[l] = 0.0;
+            result_103[l] = 0.0;
+            result_104[l] = 0.0;
+            result_105[l] = panel_right_sin;
+            result_106[l] = 0.0;
+            result_107[l] = panel_right_cos;
         }
-        jacobian.give_pair(0, [&results[0], &results[1]]);
-        jacobian.give_pair(2, [&results[2], &results[3]]);
-        jacobian.give_pair(4, [&results[4], &results[5]]);
-        jacobian.give_pair(6, [&results[6], &results[7]]);
-        jacobian.give_pair(8, [&results[8], &results[9]]);
-        jacobian.give_pair(10, [&results[10], &results[11]]);
-        jacobian.give_pair(12, [&results[12], &results[13]]);
-        jacobian.give_pair(14, [&results[14], &results[15]]);
-        jacobian.give_pair(16, [&results[16], &results[17]]);
-        jacobian.give_pair(18, [&results[18], &results[19]]);
-        jacobian.give_pair(20, [&results[20], &results[21]]);
-        jacobian.give_pair(22, [&results[22], &results[23]]);
-        jacobian.give_pair(24, [&results[24], &results[25]]);
-        jacobian.give_pair(26, [&results[26], &results[27]]);
-        jacobian.give_pair(28, [&results[28], &results[29]]);
-        jacobian.give_pair(30, [&results[30], &results[31]]);
-        jacobian.give_pair(32, [&results[32], &results[33]]);
-        jacobian.give_pair(34, [&results[34], &results[35]]);
-        jacobian.give_pair(36, [&results[36], &results[37]]);
-        jacobian.give_pair(38, [&results[38], &results[39]]);
-        jacobian.give_pair(40, [&results[40], &results[41]]);
-        jacobian.give_pair(42, [&results[42], &results[43]]);
-        jacobian.give_pair(44, [&results[44], &results[45]]);
-        jacobian.give_pair(46, [&results[46], &results[47]]);
-        jacobian.give_pair(48, [&results[48], &results[49]]);
-        jacobian.give_pair(50, [&results[50], &results[51]]);
-        jacobian.give_pair(52, [&results[52], &results[53]]);
-        jacobian.give_pair(54, [&results[54], &results[55]]);
-        jacobian.give_pair(56, [&results[56], &results[57]]);
-        jacobian.give_pair(58, [&results[58], &results[59]]);
-        jacobian.give_pair(60, [&results[60], &results[61]]);
-        jacobian.give_pair(62, [&results[62], &results[63]]);
-        jacobian.give_pair(64, [&results[64], &results[65]]);
-        jacobian.give_pair(66, [&results[66], &results[67]]);
-        jacobian.give_pair(68, [&results[68], &results[69]]);
-        jacobian.give_pair(70, [&results[70], &results[71]]);
-        jacobian.give_pair(72, [&results[72], &results[73]]);
-        jacobian.give_pair(74, [&results[74], &results[75]]);
-        jacobian.give_pair(76, [&results[76], &results[77]]);
-        jacobian.give_pair(78, [&results[78], &results[79]]);
-        jacobian.give_pair(80, [&results[80], &results[81]]);
-        jacobian.give_pair(82, [&results[82], &results[83]]);
-        jacobian.give_pair(84, [&results[84], &results[85]]);
-        jacobian.give_pair(86, [&results[86], &results[87]]);
-        jacobian.give_pair(88, [&results[88], &results[89]]);
-        jacobian.give_pair(90, [&results[90], &results[91]]);
-        jacobian.give_pair(92, [&results[92], &results[93]]);
-        jacobian.give_pair(94, [&results[94], &results[95]]);
-        jacobian.give_pair(96, [&results[96], &results[97]]);
-        jacobian.give_pair(98, [&results[98], &results[99]]);
-        jacobian.give_pair(100, [&results[100], &results[101]]);
-        jacobian.give_pair(102, [&results[102], &results[103]]);
-        jacobian.give_pair(104, [&results[104], &results[105]]);
-        jacobian.give_pair(106, [&results[106], &results[107]]);
+        jacobian.give_pair(0, [&result_0, &result_1]);
+        jacobian.give_pair(2, [&result_2, &result_3]);
+        jacobian.give_pair(4, [&result_4, &result_5]);
+        jacobian.give_pair(6, [&result_6, &result_7]);
+        jacobian.give_pair(8, [&result_8, &result_9]);
+        jacobian.give_pair(10, [&result_10, &result_11]);
+        jacobian.give_pair(12, [&result_12, &result_13]);
+        jacobian.give_pair(14, [&result_14, &result_15]);
+        jacobian.give_pair(16, [&result_16, &result_17]);
+        jacobian.give_pair(18, [&result_18, &result_19]);
+        jacobian.give_pair(20, [&result_20, &result_21]);
+        jacobian.give_pair(22, [&result_22, &result_23]);
+        jacobian.give_pair(24, [&result_24, &result_25]);
+        jacobian.give_pair(26, [&result_26, &result_27]);
+        jacobian.give_pair(28, [&result_28, &result_29]);
+        jacobian.give_pair(30, [&result_30, &result_31]);
+        jacobian.give_pair(32, [&result_32, &result_33]);
+        jacobian.give_pair(34, [&result_34, &result_35]);
+        jacobian.give_pair(36, [&result_36, &result_37]);
+        jacobian.give_pair(38, [&result_38, &result_39]);
+        jacobian.give_pair(40, [&result_40, &result_41]);
+        jacobian.give_pair(42, [&result_42, &result_43]);
+        jacobian.give_pair(44, [&result_44, &result_45]);
+        jacobian.give_pair(46, [&result_46, &result_47]);
+        jacobian.give_pair(48, [&result_48, &result_49]);
+        jacobian.give_pair(50, [&result_50, &result_51]);
+        jacobian.give_pair(52, [&result_52, &result_53]);
+        jacobian.give_pair(54, [&result_54, &result_55]);
+        jacobian.give_pair(56, [&result_56, &result_57]);
+        jacobian.give_pair(58, [&result_58, &result_59]);
+        jacobian.give_pair(60, [&result_60, &result_61]);
+        jacobian.give_pair(62, [&result_62, &result_63]);
+        jacobian.give_pair(64, [&result_64, &result_65]);
+        jacobian.give_pair(66, [&result_66, &result_67]);
+        jacobian.give_pair(68, [&result_68, &result_69]);
+        jacobian.give_pair(70, [&result_70, &result_71]);
+        jacobian.give_pair(72, [&result_72, &result_73]);
+        jacobian.give_pair(74, [&result_74, &result_75]);
+        jacobian.give_pair(76, [&result_76, &result_77]);
+        jacobian.give_pair(78, [&result_78, &result_79]);
+        jacobian.give_pair(80, [&result_80, &result_81]);
+        jacobian.give_pair(82, [&result_82, &result_83]);
+        jacobian.give_pair(84, [&result_84, &result_85]);
+        jacobian.give_pair(86, [&result_86, &result_87]);
+        jacobian.give_pair(88, [&result_88, &result_89]);
+        jacobian.give_pair(90, [&result_90, &result_91]);
+        jacobian.give_pair(92, [&result_92, &result_93]);
+        jacobian.give_pair(94, [&result_94, &result_95]);
+        jacobian.give_pair(96, [&result_96, &result_97]);
+        jacobian.give_pair(98, [&result_98, &result_99]);
+        jacobian.give_pair(100, [&result_100, &result_101]);
+        jacobian.give_pair(102, [&result_102, &result_103]);
+        jacobian.give_pair(104, [&result_104, &result_105]);
+        jacobian.give_pair(106, [&result_106, &result_107]);
     }
 
     /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
@@ -3643,29 +4029,55 @@ impl Satellite {
             angles[1][l] = drive_q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = drive_v.get(0, l); }
-        for l in 0..LANES { given[7][l] = drive_v.get(1, l); }
-        for l in 0..LANES { given[8][l] = drive_a.get(0, l); }
-        for l in 0..LANES { given[9][l] = drive_a.get(1, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 18]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = drive_v.get(0, l); }
+        for l in 0..LANES { given_7[l] = drive_v.get(1, l); }
+        for l in 0..LANES { given_8[l] = drive_a.get(0, l); }
+        for l in 0..LANES { given_9[l] = drive_a.get(1, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let drive_v_0 = given[6][l];
-            let drive_v_1 = given[7][l];
-            let drive_a_0 = given[8][l];
-            let drive_a_1 = given[9][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let drive_v_0 = given_6[l];
+            let drive_v_1 = given_7[l];
+            let drive_a_0 = given_8[l];
+            let drive_a_1 = given_9[l];
             // panel_left: sine and cosine, rotation
             let panel_left_sin = sines[0][l];
             let panel_left_cos = cosines[0][l];
@@ -3764,34 +4176,34 @@ impl Satellite {
             let bias_2_2 = panel_right_minus_accel_y + panel_right_t16;
             let panel_right_t17 = 0.6 * panel_right_t14;
             let bias_2_1 = panel_left_accel_z + panel_right_t17;
-            results[0][l] = bus_accel_x;
-            results[1][l] = bus_accel_y;
-            results[2][l] = bus_accel_z;
-            results[3][l] = 0.0;
-            results[4][l] = 0.0;
-            results[5][l] = 0.0;
-            results[6][l] = bias_1_0;
-            results[7][l] = bias_1_1;
-            results[8][l] = bias_1_2;
-            results[9][l] = -panel_left_minus_alpha_x;
-            results[10][l] = drive_a_0;
-            results[11][l] = panel_left_minus_alpha_y;
-            results[12][l] = bias_2_0;
-            results[13][l] = bias_2_1;
-            results[14][l] = bias_2_2;
-            results[15][l] = -panel_right_minus_alpha_x;
-            results[16][l] = drive_a_1;
-            results[17][l] = panel_right_minus_alpha_y;
+            result_0[l] = bus_accel_x;
+            result_1[l] = bus_accel_y;
+            result_2[l] = bus_accel_z;
+            result_3[l] = 0.0;
+            result_4[l] = 0.0;
+            result_5[l] = 0.0;
+            result_6[l] = bias_1_0;
+            result_7[l] = bias_1_1;
+            result_8[l] = bias_1_2;
+            result_9[l] = -panel_left_minus_alpha_x;
+            result_10[l] = drive_a_0;
+            result_11[l] = panel_left_minus_alpha_y;
+            result_12[l] = bias_2_0;
+            result_13[l] = bias_2_1;
+            result_14[l] = bias_2_2;
+            result_15[l] = -panel_right_minus_alpha_x;
+            result_16[l] = drive_a_1;
+            result_17[l] = panel_right_minus_alpha_y;
         }
-        bias.give_pair(0, [&results[0], &results[1]]);
-        bias.give_pair(2, [&results[2], &results[3]]);
-        bias.give_pair(4, [&results[4], &results[5]]);
-        bias.give_pair(6, [&results[6], &results[7]]);
-        bias.give_pair(8, [&results[8], &results[9]]);
-        bias.give_pair(10, [&results[10], &results[11]]);
-        bias.give_pair(12, [&results[12], &results[13]]);
-        bias.give_pair(14, [&results[14], &results[15]]);
-        bias.give_pair(16, [&results[16], &results[17]]);
+        bias.give_pair(0, [&result_0, &result_1]);
+        bias.give_pair(2, [&result_2, &result_3]);
+        bias.give_pair(4, [&result_4, &result_5]);
+        bias.give_pair(6, [&result_6, &result_7]);
+        bias.give_pair(8, [&result_8, &result_9]);
+        bias.give_pair(10, [&result_10, &result_11]);
+        bias.give_pair(12, [&result_12, &result_13]);
+        bias.give_pair(14, [&result_14, &result_15]);
+        bias.give_pair(16, [&result_16, &result_17]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -3803,29 +4215,44 @@ impl Satellite {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 10]);
-        for l in 0..LANES { given[0][l] = q.get(3, l); }
-        for l in 0..LANES { given[1][l] = q.get(4, l); }
-        for l in 0..LANES { given[2][l] = q.get(5, l); }
-        for l in 0..LANES { given[3][l] = q.get(6, l); }
-        for l in 0..LANES { given[4][l] = v.get(0, l); }
-        for l in 0..LANES { given[5][l] = v.get(1, l); }
-        for l in 0..LANES { given[6][l] = v.get(2, l); }
-        for l in 0..LANES { given[7][l] = v.get(3, l); }
-        for l in 0..LANES { given[8][l] = v.get(4, l); }
-        for l in 0..LANES { given[9][l] = v.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 7]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(3, l); }
+        for l in 0..LANES { given_1[l] = q.get(4, l); }
+        for l in 0..LANES { given_2[l] = q.get(5, l); }
+        for l in 0..LANES { given_3[l] = q.get(6, l); }
+        for l in 0..LANES { given_4[l] = v.get(0, l); }
+        for l in 0..LANES { given_5[l] = v.get(1, l); }
+        for l in 0..LANES { given_6[l] = v.get(2, l); }
+        for l in 0..LANES { given_7[l] = v.get(3, l); }
+        for l in 0..LANES { given_8[l] = v.get(4, l); }
+        for l in 0..LANES { given_9[l] = v.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
         for l in 0..LANES {
-            let q_3 = given[0][l];
-            let q_4 = given[1][l];
-            let q_5 = given[2][l];
-            let q_6 = given[3][l];
-            let v_0 = given[4][l];
-            let v_1 = given[5][l];
-            let v_2 = given[6][l];
-            let v_3 = given[7][l];
-            let v_4 = given[8][l];
-            let v_5 = given[9][l];
+            let q_3 = given_0[l];
+            let q_4 = given_1[l];
+            let q_5 = given_2[l];
+            let q_6 = given_3[l];
+            let v_0 = given_4[l];
+            let v_1 = given_5[l];
+            let v_2 = given_6[l];
+            let v_3 = given_7[l];
+            let v_4 = given_8[l];
+            let v_5 = given_9[l];
             // bus: coordinate rates
             let bus_t0 = q_3 + q_3;
             let bus_t1 = q_4 + q_4;
@@ -3890,18 +4317,18 @@ impl Satellite {
             let bus_t60 = q_5 * v_5;
             let bus_t61 = bus_t59 + bus_t60;
             let bus_t62 = 0.5 * bus_t61;
-            results[0][l] = bus_t28;
-            results[1][l] = bus_t33;
-            results[2][l] = bus_t38;
-            results[3][l] = bus_t50;
-            results[4][l] = bus_t53;
-            results[5][l] = bus_t56;
-            results[6][l] = -bus_t62;
+            result_0[l] = bus_t28;
+            result_1[l] = bus_t33;
+            result_2[l] = bus_t38;
+            result_3[l] = bus_t50;
+            result_4[l] = bus_t53;
+            result_5[l] = bus_t56;
+            result_6[l] = -bus_t62;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
-        qd.give(6, &results[6]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
+        qd.give(6, &result_6);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -105,7 +105,7 @@ impl Solo12 {
     /// Rates of the state: coordinate rates `q̇` and momentum rates `ṗ`.
     /// 2173 operations: 1061 additions, 1098 multiplications, 14 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn rates(&self, q: &[f64; 19], p: &[f64; 18], qd: &mut [f64; 19], pd: &mut [f64; 18]) {
-        Self::rates_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &self.tau, qd, pd);
+        ::multibody::runtime::kernel::call_exact::<Self, 0, _>((q, p, &self.tau, qd, pd,));
     }
 
     #[inline(always)]
@@ -145,90 +145,165 @@ impl Solo12 {
             angles[11][l] = hr_lower_leg_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 12>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 40]);
-        for l in 0..LANES { given[0][l] = q.get(3, l); }
-        for l in 0..LANES { given[1][l] = q.get(4, l); }
-        for l in 0..LANES { given[2][l] = q.get(5, l); }
-        for l in 0..LANES { given[3][l] = q.get(6, l); }
-        for l in 0..LANES { given[4][l] = p.get(0, l); }
-        for l in 0..LANES { given[5][l] = p.get(1, l); }
-        for l in 0..LANES { given[6][l] = p.get(2, l); }
-        for l in 0..LANES { given[7][l] = p.get(3, l); }
-        for l in 0..LANES { given[8][l] = p.get(4, l); }
-        for l in 0..LANES { given[9][l] = p.get(5, l); }
-        for l in 0..LANES { given[10][l] = p.get(6, l); }
-        for l in 0..LANES { given[11][l] = p.get(7, l); }
-        for l in 0..LANES { given[12][l] = p.get(8, l); }
-        for l in 0..LANES { given[13][l] = p.get(9, l); }
-        for l in 0..LANES { given[14][l] = p.get(10, l); }
-        for l in 0..LANES { given[15][l] = p.get(11, l); }
-        for l in 0..LANES { given[16][l] = p.get(12, l); }
-        for l in 0..LANES { given[17][l] = p.get(13, l); }
-        for l in 0..LANES { given[18][l] = p.get(14, l); }
-        for l in 0..LANES { given[19][l] = p.get(15, l); }
-        for l in 0..LANES { given[20][l] = p.get(16, l); }
-        for l in 0..LANES { given[21][l] = p.get(17, l); }
-        for l in 0..LANES { given[22][l] = tau.get(0, l); }
-        for l in 0..LANES { given[23][l] = tau.get(1, l); }
-        for l in 0..LANES { given[24][l] = tau.get(2, l); }
-        for l in 0..LANES { given[25][l] = tau.get(3, l); }
-        for l in 0..LANES { given[26][l] = tau.get(4, l); }
-        for l in 0..LANES { given[27][l] = tau.get(5, l); }
-        for l in 0..LANES { given[28][l] = tau.get(6, l); }
-        for l in 0..LANES { given[29][l] = tau.get(7, l); }
-        for l in 0..LANES { given[30][l] = tau.get(8, l); }
-        for l in 0..LANES { given[31][l] = tau.get(9, l); }
-        for l in 0..LANES { given[32][l] = tau.get(10, l); }
-        for l in 0..LANES { given[33][l] = tau.get(11, l); }
-        for l in 0..LANES { given[34][l] = tau.get(12, l); }
-        for l in 0..LANES { given[35][l] = tau.get(13, l); }
-        for l in 0..LANES { given[36][l] = tau.get(14, l); }
-        for l in 0..LANES { given[37][l] = tau.get(15, l); }
-        for l in 0..LANES { given[38][l] = tau.get(16, l); }
-        for l in 0..LANES { given[39][l] = tau.get(17, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 37]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        let mut given_18 = [0.0; LANES];
+        let mut given_19 = [0.0; LANES];
+        let mut given_20 = [0.0; LANES];
+        let mut given_21 = [0.0; LANES];
+        let mut given_22 = [0.0; LANES];
+        let mut given_23 = [0.0; LANES];
+        let mut given_24 = [0.0; LANES];
+        let mut given_25 = [0.0; LANES];
+        let mut given_26 = [0.0; LANES];
+        let mut given_27 = [0.0; LANES];
+        let mut given_28 = [0.0; LANES];
+        let mut given_29 = [0.0; LANES];
+        let mut given_30 = [0.0; LANES];
+        let mut given_31 = [0.0; LANES];
+        let mut given_32 = [0.0; LANES];
+        let mut given_33 = [0.0; LANES];
+        let mut given_34 = [0.0; LANES];
+        let mut given_35 = [0.0; LANES];
+        let mut given_36 = [0.0; LANES];
+        let mut given_37 = [0.0; LANES];
+        let mut given_38 = [0.0; LANES];
+        let mut given_39 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(3, l); }
+        for l in 0..LANES { given_1[l] = q.get(4, l); }
+        for l in 0..LANES { given_2[l] = q.get(5, l); }
+        for l in 0..LANES { given_3[l] = q.get(6, l); }
+        for l in 0..LANES { given_4[l] = p.get(0, l); }
+        for l in 0..LANES { given_5[l] = p.get(1, l); }
+        for l in 0..LANES { given_6[l] = p.get(2, l); }
+        for l in 0..LANES { given_7[l] = p.get(3, l); }
+        for l in 0..LANES { given_8[l] = p.get(4, l); }
+        for l in 0..LANES { given_9[l] = p.get(5, l); }
+        for l in 0..LANES { given_10[l] = p.get(6, l); }
+        for l in 0..LANES { given_11[l] = p.get(7, l); }
+        for l in 0..LANES { given_12[l] = p.get(8, l); }
+        for l in 0..LANES { given_13[l] = p.get(9, l); }
+        for l in 0..LANES { given_14[l] = p.get(10, l); }
+        for l in 0..LANES { given_15[l] = p.get(11, l); }
+        for l in 0..LANES { given_16[l] = p.get(12, l); }
+        for l in 0..LANES { given_17[l] = p.get(13, l); }
+        for l in 0..LANES { given_18[l] = p.get(14, l); }
+        for l in 0..LANES { given_19[l] = p.get(15, l); }
+        for l in 0..LANES { given_20[l] = p.get(16, l); }
+        for l in 0..LANES { given_21[l] = p.get(17, l); }
+        for l in 0..LANES { given_22[l] = tau.get(0, l); }
+        for l in 0..LANES { given_23[l] = tau.get(1, l); }
+        for l in 0..LANES { given_24[l] = tau.get(2, l); }
+        for l in 0..LANES { given_25[l] = tau.get(3, l); }
+        for l in 0..LANES { given_26[l] = tau.get(4, l); }
+        for l in 0..LANES { given_27[l] = tau.get(5, l); }
+        for l in 0..LANES { given_28[l] = tau.get(6, l); }
+        for l in 0..LANES { given_29[l] = tau.get(7, l); }
+        for l in 0..LANES { given_30[l] = tau.get(8, l); }
+        for l in 0..LANES { given_31[l] = tau.get(9, l); }
+        for l in 0..LANES { given_32[l] = tau.get(10, l); }
+        for l in 0..LANES { given_33[l] = tau.get(11, l); }
+        for l in 0..LANES { given_34[l] = tau.get(12, l); }
+        for l in 0..LANES { given_35[l] = tau.get(13, l); }
+        for l in 0..LANES { given_36[l] = tau.get(14, l); }
+        for l in 0..LANES { given_37[l] = tau.get(15, l); }
+        for l in 0..LANES { given_38[l] = tau.get(16, l); }
+        for l in 0..LANES { given_39[l] = tau.get(17, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
+        let mut result_18 = [0.0; LANES];
+        let mut result_19 = [0.0; LANES];
+        let mut result_20 = [0.0; LANES];
+        let mut result_21 = [0.0; LANES];
+        let mut result_22 = [0.0; LANES];
+        let mut result_23 = [0.0; LANES];
+        let mut result_24 = [0.0; LANES];
+        let mut result_25 = [0.0; LANES];
+        let mut result_26 = [0.0; LANES];
+        let mut result_27 = [0.0; LANES];
+        let mut result_28 = [0.0; LANES];
+        let mut result_29 = [0.0; LANES];
+        let mut result_30 = [0.0; LANES];
+        let mut result_31 = [0.0; LANES];
+        let mut result_32 = [0.0; LANES];
+        let mut result_33 = [0.0; LANES];
+        let mut result_34 = [0.0; LANES];
+        let mut result_35 = [0.0; LANES];
+        let mut result_36 = [0.0; LANES];
         for l in 0..LANES {
             let (q_3, q_4, q_5, q_6, p_0, p_1, p_2, p_3, p_4, p_5, p_6, p_7, p_8, p_9, p_10, p_11, p_12, p_13, p_14, p_15, p_16, p_17, tau_0, tau_1, tau_2, tau_3, tau_4, tau_5, tau_6, tau_7, tau_8, tau_9, tau_10, tau_11, tau_12, tau_13, tau_14, tau_15, tau_16, tau_17, base_link_t13, base_link_t14, base_link_t15, base_link_t16, base_link_t18, base_link_t19, base_link_t20, base_link_t21, base_link_t23, fl_shoulder_sin, fl_shoulder_cos, fl_lower_leg_t1, fl_lower_leg_t2, fl_lower_leg_sin, fl_lower_leg_cos, fr_shoulder_sin, fr_shoulder_cos, fr_lower_leg_t1, fr_lower_leg_t2, fr_lower_leg_sin, fr_lower_leg_cos, hl_shoulder_sin, hl_shoulder_cos, hl_lower_leg_t1, hl_lower_leg_t2, hl_lower_leg_sin, hl_lower_leg_cos, hr_shoulder_sin, hr_shoulder_cos, hr_lower_leg_t1, hr_lower_leg_t2, hr_lower_leg_sin, hr_lower_leg_cos, hr_lower_leg_t3, hr_lower_leg_t4, hr_lower_leg_t9, hr_lower_leg_t10, hr_upper_leg_m_rx_z, hr_upper_leg_minus_m_ry_z, hr_lower_leg_t26, hr_upper_leg_t20, hr_upper_leg_t21, hr_upper_leg_t22, hr_upper_leg_t23, hr_upper_leg_t24, hr_upper_leg_minus_u_x, hr_upper_leg_u_y, hr_upper_leg_u_rx, hr_upper_leg_u_ry, hr_upper_leg_rho, hr_upper_leg_minus_k_x, hr_upper_leg_k_y, hr_upper_leg_k_rx, hr_upper_leg_k_ry, hr_upper_leg_minus_mp_xx, hr_upper_leg_mp_xy, hr_upper_leg_mp_rx_x, hr_upper_leg_mp_ry_x, hr_upper_leg_minus_mp_yy, hr_upper_leg_minus_mp_rx_y, hr_upper_leg_minus_mp_ry_y, hr_upper_leg_mp_rx_rx, hr_upper_leg_minus_mp_rx_ry, hr_upper_leg_minus_mp_ry_ry, hr_shoulder_t16, hr_shoulder_minus_u_x, hr_shoulder_t18, hr_shoulder_u_y, hr_shoulder_u_rx, hr_shoulder_minus_u_ry, hr_shoulder_minus_rho, hr_shoulder_k_x, hr_shoulder_minus_k_y, hr_shoulder_k_z, hr_shoulder_minus_k_rx, hr_shoulder_k_ry, hr_shoulder_minus_mp_xx, hr_shoulder_mp_xy, hr_shoulder_minus_mp_xz, hr_shoulder_mp_rx_x, hr_shoulder_minus_mp_ry_x, hr_shoulder_minus_mp_yy, hr_shoulder_mp_yz, hr_shoulder_minus_mp_rx_y, hr_shoulder_mp_ry_y, hr_shoulder_mp_rx_z, hr_shoulder_minus_mp_ry_z, hr_shoulder_mp_rx_rx, hr_shoulder_minus_mp_rx_ry, hr_shoulder_mp_ry_ry, hl_lower_leg_t3, hl_lower_leg_t4, hl_lower_leg_t9, hl_lower_leg_t10, hl_upper_leg_m_rx_z, hl_upper_leg_minus_m_ry_z, hl_lower_leg_t26, hl_upper_leg_t20, hl_upper_leg_t21, hl_upper_leg_t22, hl_upper_leg_t23, hl_upper_leg_t24, hl_upper_leg_minus_u_x, hl_upper_leg_u_y, hl_upper_leg_minus_u_rx, hl_upper_leg_minus_u_ry, hl_upper_leg_rho, hl_upper_leg_minus_k_x, hl_upper_leg_k_y, hl_upper_leg_minus_k_rx, hl_upper_leg_minus_k_ry, hl_upper_leg_minus_mp_xx, hl_upper_leg_mp_xy, hl_upper_leg_minus_mp_rx_x, hl_upper_leg_minus_mp_ry_x, hl_upper_leg_minus_mp_yy, hl_upper_leg_mp_rx_y, hl_upper_leg_mp_ry_y, hl_upper_leg_mp_rx_rx, hl_upper_leg_minus_mp_rx_ry, hl_upper_leg_minus_mp_ry_ry, hl_shoulder_t16, hl_shoulder_u_x, hl_shoulder_t18, hl_shoulder_minus_u_y, hl_shoulder_u_rx, hl_shoulder_minus_u_ry, hl_shoulder_minus_rho, hl_shoulder_minus_k_x, hl_shoulder_k_y, hl_shoulder_minus_k_z, hl_shoulder_minus_k_rx, hl_shoulder_k_ry, hl_shoulder_minus_mp_xx, hl_shoulder_mp_xy, hl_shoulder_minus_mp_xz, hl_shoulder_minus_mp_rx_x, hl_shoulder_minus_mp_ry_x, hl_shoulder_minus_mp_yy, hl_shoulder_mp_yz, hl_shoulder_mp_rx_y, hl_shoulder_minus_mp_ry_y, hl_shoulder_minus_mp_rx_z, hl_shoulder_mp_ry_z, hl_shoulder_mp_rx_rx, hl_shoulder_minus_mp_rx_ry, hl_shoulder_mp_ry_ry, fr_lower_leg_t3, fr_lower_leg_t4, fr_lower_leg_t9, fr_lower_leg_t10, fr_upper_leg_m_rx_z, fr_upper_leg_minus_m_ry_z, fr_lower_leg_t26, fr_upper_leg_t20, fr_upper_leg_t21, fr_upper_leg_t22, fr_upper_leg_t23, fr_upper_leg_t24, fr_upper_leg_minus_u_x, fr_upper_leg_u_y, fr_upper_leg_u_rx, fr_upper_leg_u_ry, fr_upper_leg_rho, fr_upper_leg_minus_k_x, fr_upper_leg_k_y, fr_upper_leg_k_rx, fr_upper_leg_k_ry, fr_upper_leg_minus_mp_xx, fr_upper_leg_mp_xy, fr_upper_leg_mp_rx_x, fr_upper_leg_mp_ry_x, fr_upper_leg_minus_mp_yy, fr_upper_leg_minus_mp_rx_y, fr_upper_leg_minus_mp_ry_y, fr_upper_leg_mp_rx_rx, fr_upper_leg_minus_mp_rx_ry, fr_upper_leg_minus_mp_ry_ry, fr_shoulder_t16, fr_shoulder_minus_u_x, fr_shoulder_t18, fr_shoulder_u_y, fr_shoulder_u_rx, fr_shoulder_minus_u_ry, fr_shoulder_minus_rho, fr_shoulder_k_x, fr_shoulder_minus_k_y, fr_shoulder_k_z, fr_shoulder_minus_k_rx, fr_shoulder_k_ry, fr_shoulder_minus_mp_xx, fr_shoulder_mp_xy, fr_shoulder_minus_mp_xz, fr_shoulder_mp_rx_x, fr_shoulder_minus_mp_ry_x, fr_shoulder_minus_mp_yy, fr_shoulder_mp_yz, fr_shoulder_minus_mp_rx_y, fr_shoulder_mp_ry_y, fr_shoulder_mp_rx_z, fr_shoulder_minus_mp_ry_z, fr_shoulder_mp_rx_rx, fr_shoulder_minus_mp_rx_ry, fr_shoulder_mp_ry_ry, fr_shoulder_t94, fr_shoulder_t95, fr_shoulder_t96, fr_shoulder_t97, fr_shoulder_t98, fr_shoulder_t99, fr_shoulder_t100, fr_shoulder_t101, fr_shoulder_t102, fr_shoulder_t103, fr_shoulder_t104, fr_shoulder_t105, fr_shoulder_t106, fr_shoulder_t107, fr_shoulder_t108, fr_shoulder_t109, fr_shoulder_t110, fr_shoulder_t111, fr_shoulder_t112, fr_shoulder_t113, fr_shoulder_t114, fl_lower_leg_t3, fl_lower_leg_t4, fl_lower_leg_t9, fl_lower_leg_t10, fl_upper_leg_m_rx_z, fl_upper_leg_minus_m_ry_z, fl_lower_leg_t26, fl_upper_leg_t20, fl_upper_leg_t21, fl_upper_leg_t22, fl_upper_leg_t23, fl_upper_leg_t24, fl_upper_leg_minus_u_x, fl_upper_leg_u_y, fl_upper_leg_minus_u_rx, fl_upper_leg_minus_u_ry, fl_upper_leg_rho, fl_upper_leg_minus_k_x, fl_upper_leg_k_y, fl_upper_leg_minus_k_rx, fl_upper_leg_minus_k_ry, fl_upper_leg_minus_mp_xx, fl_upper_leg_mp_xy, fl_upper_leg_minus_mp_rx_x, fl_upper_leg_minus_mp_ry_x, fl_upper_leg_minus_mp_yy, fl_upper_leg_mp_rx_y, fl_upper_leg_mp_ry_y, fl_upper_leg_mp_rx_rx, fl_upper_leg_minus_mp_rx_ry, fl_upper_leg_minus_mp_ry_ry, fl_shoulder_t1, fl_shoulder_t2, fl_shoulder_t4, fl_shoulder_t5, fl_shoulder_t16, fl_shoulder_u_x, fl_shoulder_t18, fl_shoulder_minus_u_y, fl_shoulder_t30, fl_shoulder_t32, fl_shoulder_t34, fl_shoulder_t35, fl_shoulder_t37, fl_shoulder_t39, fl_shoulder_u_rx, fl_shoulder_minus_u_ry, fl_shoulder_t44, fl_shoulder_t47, fl_shoulder_t50, fl_shoulder_minus_rho, fl_shoulder_minus_k_x, fl_shoulder_k_y, fl_shoulder_minus_k_z, fl_shoulder_minus_k_rx, fl_shoulder_k_ry, fl_shoulder_minus_mp_xx) = {
-                let q_3 = given[0][l];
-                let q_4 = given[1][l];
-                let q_5 = given[2][l];
-                let q_6 = given[3][l];
-                let p_0 = given[4][l];
-                let p_1 = given[5][l];
-                let p_2 = given[6][l];
-                let p_3 = given[7][l];
-                let p_4 = given[8][l];
-                let p_5 = given[9][l];
-                let p_6 = given[10][l];
-                let p_7 = given[11][l];
-                let p_8 = given[12][l];
-                let p_9 = given[13][l];
-                let p_10 = given[14][l];
-                let p_11 = given[15][l];
-                let p_12 = given[16][l];
-                let p_13 = given[17][l];
-                let p_14 = given[18][l];
-                let p_15 = given[19][l];
-                let p_16 = given[20][l];
-                let p_17 = given[21][l];
-                let tau_0 = given[22][l];
-                let tau_1 = given[23][l];
-                let tau_2 = given[24][l];
-                let tau_3 = given[25][l];
-                let tau_4 = given[26][l];
-                let tau_5 = given[27][l];
-                let tau_6 = given[28][l];
-                let tau_7 = given[29][l];
-                let tau_8 = given[30][l];
-                let tau_9 = given[31][l];
-                let tau_10 = given[32][l];
-                let tau_11 = given[33][l];
-                let tau_12 = given[34][l];
-                let tau_13 = given[35][l];
-                let tau_14 = given[36][l];
-                let tau_15 = given[37][l];
-                let tau_16 = given[38][l];
-                let tau_17 = given[39][l];
+                let q_3 = given_0[l];
+                let q_4 = given_1[l];
+                let q_5 = given_2[l];
+                let q_6 = given_3[l];
+                let p_0 = given_4[l];
+                let p_1 = given_5[l];
+                let p_2 = given_6[l];
+                let p_3 = given_7[l];
+                let p_4 = given_8[l];
+                let p_5 = given_9[l];
+                let p_6 = given_10[l];
+                let p_7 = given_11[l];
+                let p_8 = given_12[l];
+                let p_9 = given_13[l];
+                let p_10 = given_14[l];
+                let p_11 = given_15[l];
+                let p_12 = given_16[l];
+                let p_13 = given_17[l];
+                let p_14 = given_18[l];
+                let p_15 = given_19[l];
+                let p_16 = given_20[l];
+                let p_17 = given_21[l];
+                let tau_0 = given_22[l];
+                let tau_1 = given_23[l];
+                let tau_2 = given_24[l];
+                let tau_3 = given_25[l];
+                let tau_4 = given_26[l];
+                let tau_5 = given_27[l];
+                let tau_6 = given_28[l];
+                let tau_7 = given_29[l];
+                let tau_8 = given_30[l];
+                let tau_9 = given_31[l];
+                let tau_10 = given_32[l];
+                let tau_11 = given_33[l];
+                let tau_12 = given_34[l];
+                let tau_13 = given_35[l];
+                let tau_14 = given_36[l];
+                let tau_15 = given_37[l];
+                let tau_16 = given_38[l];
+                let tau_17 = given_39[l];
                 // base_link: sine and cosine, rotation
                 let base_link_t0 = q_3 + q_3;
                 let base_link_t1 = q_4 + q_4;
@@ -2519,63 +2594,63 @@ impl Solo12 {
                 let pd_17 = tau_17 + hr_lower_leg_t53;
                 (pd_0, pd_1, pd_2, pd_3, pd_4, pd_5, pd_6, pd_7, pd_8, pd_9, pd_10, pd_11, pd_12, pd_13, pd_14, pd_15, pd_16, pd_17)
             };
-            results[0][l] = qd_0;
-            results[1][l] = -minus_qd_1;
-            results[2][l] = qd_2;
-            results[3][l] = qd_3;
-            results[4][l] = qd_4;
-            results[5][l] = -minus_qd_5;
-            results[6][l] = -minus_qd_6;
-            results[7][l] = -fl_shoulder_minus_v;
-            results[8][l] = fl_upper_leg_v;
-            results[9][l] = fl_lower_leg_v;
-            results[10][l] = -fr_shoulder_minus_v;
-            results[11][l] = fr_upper_leg_v;
-            results[12][l] = fr_lower_leg_v;
-            results[13][l] = -hl_shoulder_minus_v;
-            results[14][l] = hl_upper_leg_v;
-            results[15][l] = hl_lower_leg_v;
-            results[16][l] = -hr_shoulder_minus_v;
-            results[17][l] = hr_upper_leg_v;
-            results[18][l] = hr_lower_leg_v;
-            results[19][l] = pd_0;
-            results[20][l] = pd_1;
-            results[21][l] = pd_2;
-            results[22][l] = pd_3;
-            results[23][l] = pd_4;
-            results[24][l] = pd_5;
-            results[25][l] = pd_6;
-            results[26][l] = pd_7;
-            results[27][l] = pd_8;
-            results[28][l] = pd_9;
-            results[29][l] = pd_10;
-            results[30][l] = pd_11;
-            results[31][l] = pd_12;
-            results[32][l] = pd_13;
-            results[33][l] = pd_14;
-            results[34][l] = pd_15;
-            results[35][l] = pd_16;
-            results[36][l] = pd_17;
+            result_0[l] = qd_0;
+            result_1[l] = -minus_qd_1;
+            result_2[l] = qd_2;
+            result_3[l] = qd_3;
+            result_4[l] = qd_4;
+            result_5[l] = -minus_qd_5;
+            result_6[l] = -minus_qd_6;
+            result_7[l] = -fl_shoulder_minus_v;
+            result_8[l] = fl_upper_leg_v;
+            result_9[l] = fl_lower_leg_v;
+            result_10[l] = -fr_shoulder_minus_v;
+            result_11[l] = fr_upper_leg_v;
+            result_12[l] = fr_lower_leg_v;
+            result_13[l] = -hl_shoulder_minus_v;
+            result_14[l] = hl_upper_leg_v;
+            result_15[l] = hl_lower_leg_v;
+            result_16[l] = -hr_shoulder_minus_v;
+            result_17[l] = hr_upper_leg_v;
+            result_18[l] = hr_lower_leg_v;
+            result_19[l] = pd_0;
+            result_20[l] = pd_1;
+            result_21[l] = pd_2;
+            result_22[l] = pd_3;
+            result_23[l] = pd_4;
+            result_24[l] = pd_5;
+            result_25[l] = pd_6;
+            result_26[l] = pd_7;
+            result_27[l] = pd_8;
+            result_28[l] = pd_9;
+            result_29[l] = pd_10;
+            result_30[l] = pd_11;
+            result_31[l] = pd_12;
+            result_32[l] = pd_13;
+            result_33[l] = pd_14;
+            result_34[l] = pd_15;
+            result_35[l] = pd_16;
+            result_36[l] = pd_17;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
-        qd.give_pair(6, [&results[6], &results[7]]);
-        qd.give_pair(8, [&results[8], &results[9]]);
-        qd.give_pair(10, [&results[10], &results[11]]);
-        qd.give_pair(12, [&results[12], &results[13]]);
-        qd.give_pair(14, [&results[14], &results[15]]);
-        qd.give_pair(16, [&results[16], &results[17]]);
-        qd.give(18, &results[18]);
-        pd.give_pair(0, [&results[19], &results[20]]);
-        pd.give_pair(2, [&results[21], &results[22]]);
-        pd.give_pair(4, [&results[23], &results[24]]);
-        pd.give_pair(6, [&results[25], &results[26]]);
-        pd.give_pair(8, [&results[27], &results[28]]);
-        pd.give_pair(10, [&results[29], &results[30]]);
-        pd.give_pair(12, [&results[31], &results[32]]);
-        pd.give_pair(14, [&results[33], &results[34]]);
-        pd.give_pair(16, [&results[35], &results[36]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
+        qd.give_pair(6, [&result_6, &result_7]);
+        qd.give_pair(8, [&result_8, &result_9]);
+        qd.give_pair(10, [&result_10, &result_11]);
+        qd.give_pair(12, [&result_12, &result_13]);
+        qd.give_pair(14, [&result_14, &result_15]);
+        qd.give_pair(16, [&result_16, &result_17]);
+        qd.give(18, &result_18);
+        pd.give_pair(0, [&result_19, &result_20]);
+        pd.give_pair(2, [&result_21, &result_22]);
+        pd.give_pair(4, [&result_23, &result_24]);
+        pd.give_pair(6, [&result_25, &result_26]);
+        pd.give_pair(8, [&result_27, &result_28]);
+        pd.give_pair(10, [&result_29, &result_30]);
+        pd.give_pair(12, [&result_31, &result_32]);
+        pd.give_pair(14, [&result_33, &result_34]);
+        pd.give_pair(16, [&result_35, &result_36]);
     }
 
     /// One state: like branches at the same time, in the lanes of vector registers.
@@ -2619,27 +2694,100 @@ impl Solo12 {
             let base_link_t11 = q_6 * base_link_t2;
             let base_link_t12 = base_link_t4 + base_link_t5;
             let base_link_t13 = base_link_t12 - 1.0;
+            kept[0] = base_link_t13;
             let base_link_t14 = base_link_t6 - base_link_t11;
+            kept[1] = base_link_t14;
             let base_link_t15 = base_link_t7 + base_link_t10;
+            kept[2] = base_link_t15;
             let base_link_t16 = base_link_t6 + base_link_t11;
+            kept[3] = base_link_t16;
             let base_link_t17 = base_link_t3 + base_link_t5;
             let base_link_t18 = base_link_t17 - 1.0;
+            kept[4] = base_link_t18;
             let base_link_t19 = base_link_t8 - base_link_t9;
+            kept[5] = base_link_t19;
             let base_link_t20 = base_link_t7 - base_link_t10;
+            kept[6] = base_link_t20;
             let base_link_t21 = base_link_t8 + base_link_t9;
+            kept[7] = base_link_t21;
             let base_link_t22 = base_link_t3 + base_link_t4;
             let base_link_t23 = base_link_t22 - 1.0;
-            kept[0] = base_link_t13;
-            kept[1] = base_link_t14;
-            kept[2] = base_link_t15;
-            kept[3] = base_link_t16;
-            kept[4] = base_link_t18;
-            kept[5] = base_link_t19;
-            kept[6] = base_link_t20;
-            kept[7] = base_link_t21;
             kept[8] = base_link_t23;
         }
-        let mut branches2 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 74]);
+        let mut branches2_0 = [0.0; LANES];
+        let mut branches2_1 = [0.0; LANES];
+        let mut branches2_2 = [0.0; LANES];
+        let mut branches2_3 = [0.0; LANES];
+        let mut branches2_4 = [0.0; LANES];
+        let mut branches2_5 = [0.0; LANES];
+        let mut branches2_6 = [0.0; LANES];
+        let mut branches2_7 = [0.0; LANES];
+        let mut branches2_8 = [0.0; LANES];
+        let mut branches2_9 = [0.0; LANES];
+        let mut branches2_10 = [0.0; LANES];
+        let mut branches2_11 = [0.0; LANES];
+        let mut branches2_12 = [0.0; LANES];
+        let mut branches2_13 = [0.0; LANES];
+        let mut branches2_14 = [0.0; LANES];
+        let mut branches2_15 = [0.0; LANES];
+        let mut branches2_16 = [0.0; LANES];
+        let mut branches2_17 = [0.0; LANES];
+        let mut branches2_18 = [0.0; LANES];
+        let mut branches2_19 = [0.0; LANES];
+        let mut branches2_20 = [0.0; LANES];
+        let mut branches2_21 = [0.0; LANES];
+        let mut branches2_22 = [0.0; LANES];
+        let mut branches2_23 = [0.0; LANES];
+        let mut branches2_24 = [0.0; LANES];
+        let mut branches2_25 = [0.0; LANES];
+        let mut branches2_26 = [0.0; LANES];
+        let mut branches2_27 = [0.0; LANES];
+        let mut branches2_28 = [0.0; LANES];
+        let mut branches2_29 = [0.0; LANES];
+        let mut branches2_30 = [0.0; LANES];
+        let mut branches2_31 = [0.0; LANES];
+        let mut branches2_32 = [0.0; LANES];
+        let mut branches2_33 = [0.0; LANES];
+        let mut branches2_34 = [0.0; LANES];
+        let mut branches2_35 = [0.0; LANES];
+        let mut branches2_36 = [0.0; LANES];
+        let mut branches2_37 = [0.0; LANES];
+        let mut branches2_38 = [0.0; LANES];
+        let mut branches2_39 = [0.0; LANES];
+        let mut branches2_40 = [0.0; LANES];
+        let mut branches2_41 = [0.0; LANES];
+        let mut branches2_42 = [0.0; LANES];
+        let mut branches2_43 = [0.0; LANES];
+        let mut branches2_44 = [0.0; LANES];
+        let mut branches2_45 = [0.0; LANES];
+        let mut branches2_46 = [0.0; LANES];
+        let mut branches2_47 = [0.0; LANES];
+        let mut branches2_48 = [0.0; LANES];
+        let mut branches2_49 = [0.0; LANES];
+        let mut branches2_50 = [0.0; LANES];
+        let mut branches2_51 = [0.0; LANES];
+        let mut branches2_52 = [0.0; LANES];
+        let mut branches2_53 = [0.0; LANES];
+        let mut branches2_54 = [0.0; LANES];
+        let mut branches2_55 = [0.0; LANES];
+        let mut branches2_56 = [0.0; LANES];
+        let mut branches2_57 = [0.0; LANES];
+        let mut branches2_58 = [0.0; LANES];
+        let mut branches2_59 = [0.0; LANES];
+        let mut branches2_60 = [0.0; LANES];
+        let mut branches2_61 = [0.0; LANES];
+        let mut branches2_62 = [0.0; LANES];
+        let mut branches2_63 = [0.0; LANES];
+        let mut branches2_64 = [0.0; LANES];
+        let mut branches2_65 = [0.0; LANES];
+        let mut branches2_66 = [0.0; LANES];
+        let mut branches2_67 = [0.0; LANES];
+        let mut branches2_68 = [0.0; LANES];
+        let mut branches2_69 = [0.0; LANES];
+        let mut branches2_70 = [0.0; LANES];
+        let mut branches2_71 = [0.0; LANES];
+        let mut branches2_72 = [0.0; LANES];
+        let mut branches2_73 = [0.0; LANES];
         {
             let given9 = [p.get(8, 0), p.get(11, 0), p.get(14, 0), p.get(17, 0)];
             let given10 = [p.get(7, 0), p.get(10, 0), p.get(13, 0), p.get(16, 0)];
@@ -2672,7 +2820,9 @@ impl Solo12 {
                 let fl_upper_leg_t18 = 6.823068516838894e-8 * row_3;
                 let fl_upper_leg_t19 = fl_upper_leg_t17 + fl_upper_leg_t18;
                 let fl_lower_leg_t0 = 0.16 * row_3;
+                branches2_0[k] = fl_lower_leg_t0;
                 let fl_lower_leg_t1 = 0.16 * row_2;
+                branches2_1[k] = fl_lower_leg_t1;
                 let row_6 = sines[2][k];
                 let fl_lower_leg_t2 = 0.0038482516772413004 * row_6;
                 let row_7 = cosines[2][k];
@@ -2697,7 +2847,9 @@ impl Solo12 {
                 let fl_lower_leg_t20 = fl_lower_leg_t5 - fl_lower_leg_t19;
                 let fl_lower_leg_t21 = fl_lower_leg_t14 + fl_lower_leg_t19;
                 let fl_upper_leg_m_rx_z = fl_upper_leg_t5 + fl_lower_leg_t2;
+                branches2_2[k] = fl_upper_leg_m_rx_z;
                 let fl_upper_leg_minus_m_ry_z = fl_upper_leg_t2 + fl_lower_leg_t3;
+                branches2_3[k] = fl_upper_leg_minus_m_ry_z;
                 let fl_upper_leg_m_rx_rx = fl_upper_leg_t13 + fl_lower_leg_t15;
                 let fl_upper_leg_minus_m_rx_ry = fl_upper_leg_t12 + fl_lower_leg_t17;
                 let fl_upper_leg_m_rx_rz = fl_upper_leg_t16 + fl_lower_leg_t8;
@@ -2709,10 +2861,15 @@ impl Solo12 {
                 let fl_lower_leg_t24 = fl_lower_leg_t0 * fl_lower_leg_t3;
                 let fl_lower_leg_t25 = fl_lower_leg_t23 + fl_lower_leg_t24;
                 let fl_upper_leg_t20 = 1842.9129686423128 * fl_lower_leg_t2;
+                branches2_4[k] = fl_upper_leg_t20;
                 let fl_upper_leg_t21 = 1842.9129686423128 * fl_lower_leg_t3;
+                branches2_5[k] = fl_upper_leg_t21;
                 let fl_upper_leg_t22 = 1842.9129686423128 * fl_lower_leg_t8;
+                branches2_6[k] = fl_upper_leg_t22;
                 let fl_upper_leg_t23 = 1842.9129686423128 * fl_lower_leg_t9;
+                branches2_7[k] = fl_upper_leg_t23;
                 let fl_upper_leg_t24 = 1842.9129686423128 * fl_lower_leg_t25;
+                branches2_8[k] = fl_upper_leg_t24;
                 let fl_upper_leg_t25 = fl_lower_leg_t2 * fl_upper_leg_t20;
                 let fl_upper_leg_t26 = fl_lower_leg_t2 * fl_upper_leg_t21;
                 let fl_upper_leg_t27 = fl_lower_leg_t2 * fl_upper_leg_t22;
@@ -2738,29 +2895,43 @@ impl Solo12 {
                 let fl_upper_leg_u_rz = fl_upper_leg_m_rz_rz - fl_upper_leg_t42;
                 let fl_upper_leg_rho = 1.0 / fl_upper_leg_u_rz;
                 let fl_upper_leg_minus_k_x = fl_upper_leg_minus_u_x * fl_upper_leg_rho;
+                branches2_9[k] = fl_upper_leg_minus_k_x;
                 let fl_upper_leg_k_y = fl_upper_leg_u_y * fl_upper_leg_rho;
+                branches2_10[k] = fl_upper_leg_k_y;
                 let fl_upper_leg_k_rx = fl_upper_leg_u_rx * fl_upper_leg_rho;
+                branches2_11[k] = fl_upper_leg_k_rx;
                 let fl_upper_leg_k_ry = fl_upper_leg_u_ry * fl_upper_leg_rho;
+                branches2_12[k] = fl_upper_leg_k_ry;
                 let fl_upper_leg_t43 = fl_upper_leg_minus_u_x * fl_upper_leg_minus_k_x;
                 let fl_upper_leg_minus_mp_xx = fl_upper_leg_t25 + fl_upper_leg_t43;
+                branches2_13[k] = fl_upper_leg_minus_mp_xx;
                 let fl_upper_leg_t44 = fl_upper_leg_minus_u_x * fl_upper_leg_k_y;
                 let fl_upper_leg_mp_xy = fl_upper_leg_t26 + fl_upper_leg_t44;
+                branches2_14[k] = fl_upper_leg_mp_xy;
                 let fl_upper_leg_t45 = fl_upper_leg_minus_u_x * fl_upper_leg_k_rx;
                 let fl_upper_leg_mp_rx_x = fl_upper_leg_t27 + fl_upper_leg_t45;
+                branches2_15[k] = fl_upper_leg_mp_rx_x;
                 let fl_upper_leg_t46 = fl_upper_leg_minus_u_x * fl_upper_leg_k_ry;
                 let fl_upper_leg_mp_ry_x = fl_upper_leg_t28 + fl_upper_leg_t46;
+                branches2_16[k] = fl_upper_leg_mp_ry_x;
                 let fl_upper_leg_t47 = fl_upper_leg_u_y * fl_upper_leg_k_y;
                 let fl_upper_leg_minus_mp_yy = fl_upper_leg_t30 + fl_upper_leg_t47;
+                branches2_17[k] = fl_upper_leg_minus_mp_yy;
                 let fl_upper_leg_t48 = fl_upper_leg_u_y * fl_upper_leg_k_rx;
                 let fl_upper_leg_minus_mp_rx_y = fl_upper_leg_t31 + fl_upper_leg_t48;
+                branches2_18[k] = fl_upper_leg_minus_mp_rx_y;
                 let fl_upper_leg_t49 = fl_upper_leg_u_y * fl_upper_leg_k_ry;
                 let fl_upper_leg_minus_mp_ry_y = fl_upper_leg_t32 + fl_upper_leg_t49;
+                branches2_19[k] = fl_upper_leg_minus_mp_ry_y;
                 let fl_upper_leg_t50 = fl_upper_leg_u_rx * fl_upper_leg_k_rx;
                 let fl_upper_leg_mp_rx_rx = fl_upper_leg_t35 - fl_upper_leg_t50;
+                branches2_20[k] = fl_upper_leg_mp_rx_rx;
                 let fl_upper_leg_t51 = fl_upper_leg_u_rx * fl_upper_leg_k_ry;
                 let fl_upper_leg_minus_mp_rx_ry = fl_upper_leg_t37 + fl_upper_leg_t51;
+                branches2_21[k] = fl_upper_leg_minus_mp_rx_ry;
                 let fl_upper_leg_t52 = fl_upper_leg_u_ry * fl_upper_leg_k_ry;
                 let fl_upper_leg_minus_mp_ry_ry = fl_upper_leg_t40 + fl_upper_leg_t52;
+                branches2_22[k] = fl_upper_leg_minus_mp_ry_ry;
                 let table_2 = table[2][k];
                 let fl_shoulder_m_rx_z = table_2 + fl_upper_leg_minus_mp_rx_y;
                 let fl_shoulder_minus_m_rz_x = table_2 + fl_upper_leg_mp_ry_x;
@@ -2768,6 +2939,7 @@ impl Solo12 {
                 let fl_shoulder_minus_m_rz_rz = fl_upper_leg_minus_mp_ry_ry - 0.003179970268177617;
                 let p_8 = given9[k];
                 let fl_upper_leg_t53 = 1842.9129686423128 * p_8;
+                branches2_23[k] = fl_upper_leg_t53;
                 let fl_upper_leg_t54 = fl_lower_leg_t2 * fl_upper_leg_t53;
                 let fl_upper_leg_t55 = fl_lower_leg_t3 * fl_upper_leg_t53;
                 let fl_upper_leg_t56 = fl_lower_leg_t8 * fl_upper_leg_t53;
@@ -2776,14 +2948,19 @@ impl Solo12 {
                 let p_7 = given10[k];
                 let fl_upper_leg_t59 = p_7 - fl_upper_leg_t58;
                 let fl_upper_leg_e = fl_upper_leg_rho * fl_upper_leg_t59;
+                branches2_24[k] = fl_upper_leg_e;
                 let fl_upper_leg_t60 = fl_upper_leg_minus_u_x * fl_upper_leg_e;
                 let fl_upper_leg_minus_dp_x = fl_upper_leg_t54 + fl_upper_leg_t60;
+                branches2_25[k] = fl_upper_leg_minus_dp_x;
                 let fl_upper_leg_t61 = fl_upper_leg_u_y * fl_upper_leg_e;
                 let fl_upper_leg_dp_y = fl_upper_leg_t55 + fl_upper_leg_t61;
+                branches2_26[k] = fl_upper_leg_dp_y;
                 let fl_upper_leg_t62 = fl_upper_leg_u_rx * fl_upper_leg_e;
                 let fl_upper_leg_dp_rx = fl_upper_leg_t56 + fl_upper_leg_t62;
+                branches2_27[k] = fl_upper_leg_dp_rx;
                 let fl_upper_leg_t63 = fl_upper_leg_u_ry * fl_upper_leg_e;
                 let fl_upper_leg_dp_ry = fl_upper_leg_t57 + fl_upper_leg_t63;
+                branches2_28[k] = fl_upper_leg_dp_ry;
                 let row_1 = cosines[0][k];
                 let fl_shoulder_t0 = row_1 * fl_upper_leg_minus_mp_xx;
                 let fl_shoulder_t1 = row_1 * fl_shoulder_t0;
@@ -2845,69 +3022,104 @@ impl Solo12 {
                 let fl_shoulder_t50 = fl_shoulder_t21 - fl_shoulder_t49;
                 let fl_shoulder_minus_rho = 1.0 / fl_shoulder_minus_m_rz_rz;
                 let fl_shoulder_k_x = fl_shoulder_minus_u_x * fl_shoulder_minus_rho;
+                branches2_29[k] = fl_shoulder_k_x;
                 let fl_shoulder_minus_k_y = fl_shoulder_u_y * fl_shoulder_minus_rho;
+                branches2_30[k] = fl_shoulder_minus_k_y;
                 let fl_shoulder_k_z = fl_upper_leg_minus_mp_ry_y * fl_shoulder_minus_rho;
+                branches2_31[k] = fl_shoulder_k_z;
                 let fl_shoulder_minus_k_rx = fl_shoulder_u_rx * fl_shoulder_minus_rho;
+                branches2_32[k] = fl_shoulder_minus_k_rx;
                 let fl_shoulder_k_ry = fl_shoulder_minus_u_ry * fl_shoulder_minus_rho;
+                branches2_33[k] = fl_shoulder_k_ry;
                 let fl_shoulder_t51 = fl_shoulder_minus_u_x * fl_shoulder_k_x;
                 let fl_shoulder_minus_mp_xx = fl_shoulder_t3 - fl_shoulder_t51;
+                branches2_34[k] = fl_shoulder_minus_mp_xx;
                 let fl_shoulder_t52 = fl_shoulder_minus_u_x * fl_shoulder_minus_k_y;
                 let fl_shoulder_mp_xy = fl_shoulder_t2 - fl_shoulder_t52;
+                branches2_35[k] = fl_shoulder_mp_xy;
                 let fl_shoulder_t53 = fl_shoulder_minus_u_x * fl_shoulder_k_z;
                 let fl_shoulder_minus_mp_xz = fl_shoulder_t4 - fl_shoulder_t53;
+                branches2_36[k] = fl_shoulder_minus_mp_xz;
                 let fl_shoulder_t54 = fl_shoulder_minus_u_x * fl_shoulder_minus_k_rx;
                 let fl_shoulder_mp_rx_x = fl_shoulder_t30 - fl_shoulder_t54;
+                branches2_37[k] = fl_shoulder_mp_rx_x;
                 let fl_shoulder_t55 = fl_shoulder_minus_u_x * fl_shoulder_k_ry;
                 let fl_shoulder_minus_mp_ry_x = fl_shoulder_t32 - fl_shoulder_t55;
+                branches2_38[k] = fl_shoulder_minus_mp_ry_x;
                 let fl_shoulder_t56 = fl_shoulder_u_y * fl_shoulder_minus_k_y;
                 let fl_shoulder_minus_mp_yy = fl_shoulder_t1 - fl_shoulder_t56;
+                branches2_39[k] = fl_shoulder_minus_mp_yy;
                 let fl_shoulder_t57 = fl_shoulder_u_y * fl_shoulder_k_z;
                 let fl_shoulder_mp_yz = fl_shoulder_t5 - fl_shoulder_t57;
+                branches2_40[k] = fl_shoulder_mp_yz;
                 let fl_shoulder_t58 = fl_shoulder_u_y * fl_shoulder_minus_k_rx;
                 let fl_shoulder_minus_mp_rx_y = fl_shoulder_t34 - fl_shoulder_t58;
+                branches2_41[k] = fl_shoulder_minus_mp_rx_y;
                 let fl_shoulder_t59 = fl_shoulder_u_y * fl_shoulder_k_ry;
                 let fl_shoulder_mp_ry_y = fl_shoulder_t35 - fl_shoulder_t59;
+                branches2_42[k] = fl_shoulder_mp_ry_y;
                 let fl_shoulder_t60 = fl_upper_leg_minus_mp_ry_y * fl_shoulder_k_z;
                 let fl_shoulder_minus_mp_zz = fl_upper_leg_minus_mp_yy - fl_shoulder_t60;
                 let fl_shoulder_t61 = fl_upper_leg_minus_mp_ry_y * fl_shoulder_minus_k_rx;
                 let fl_shoulder_mp_rx_z = fl_shoulder_t37 - fl_shoulder_t61;
+                branches2_43[k] = fl_shoulder_mp_rx_z;
                 let fl_shoulder_t62 = fl_upper_leg_minus_mp_ry_y * fl_shoulder_k_ry;
                 let fl_shoulder_minus_mp_ry_z = fl_shoulder_t39 - fl_shoulder_t62;
+                branches2_44[k] = fl_shoulder_minus_mp_ry_z;
                 let fl_shoulder_t63 = fl_shoulder_u_rx * fl_shoulder_minus_k_rx;
                 let fl_shoulder_mp_rx_rx = fl_shoulder_t44 + fl_shoulder_t63;
+                branches2_45[k] = fl_shoulder_mp_rx_rx;
                 let fl_shoulder_t64 = fl_shoulder_u_rx * fl_shoulder_k_ry;
                 let fl_shoulder_minus_mp_rx_ry = fl_shoulder_t50 + fl_shoulder_t64;
+                branches2_46[k] = fl_shoulder_minus_mp_rx_ry;
                 let fl_shoulder_t65 = fl_shoulder_minus_u_ry * fl_shoulder_k_ry;
                 let fl_shoulder_mp_ry_ry = fl_shoulder_t47 + fl_shoulder_t65;
+                branches2_47[k] = fl_shoulder_mp_ry_ry;
                 let fl_shoulder_t66 = fl_shoulder_minus_mp_yy - fl_shoulder_minus_mp_zz;
                 let fl_shoulder_t67 = fl_shoulder_minus_mp_yy - fl_shoulder_t66;
                 let fl_shoulder_t68 = fl_shoulder_minus_mp_zz + fl_shoulder_t66;
+                branches2_48[k] = fl_shoulder_t68;
                 let table_0 = table[0][k];
                 let fl_shoulder_t69 = table_0 * fl_shoulder_mp_xy;
+                branches2_49[k] = fl_shoulder_t69;
                 let fl_shoulder_t70 = table_0 * fl_shoulder_minus_mp_xz;
                 let fl_shoulder_t71 = fl_shoulder_minus_mp_ry_x - fl_shoulder_t70;
+                branches2_50[k] = fl_shoulder_t71;
                 let fl_shoulder_t72 = table_0 * fl_shoulder_mp_yz;
                 let fl_shoulder_t73 = table_0 * fl_shoulder_t67;
                 let fl_shoulder_t74 = fl_shoulder_minus_mp_ry_z - fl_shoulder_t73;
+                branches2_51[k] = fl_shoulder_t74;
                 let fl_shoulder_t75 = table_0 * fl_shoulder_t68;
+                branches2_52[k] = fl_shoulder_t75;
                 let fl_shoulder_t76 = fl_shoulder_mp_ry_y - fl_shoulder_t72;
+                branches2_53[k] = fl_shoulder_t76;
                 let fl_shoulder_t77 = table_0 * fl_shoulder_minus_mp_rx_y;
+                branches2_54[k] = fl_shoulder_t77;
                 let fl_shoulder_t78 = table_0 * fl_shoulder_mp_rx_z;
                 let fl_shoulder_t79 = fl_shoulder_minus_mp_rx_ry + fl_shoulder_t78;
+                branches2_55[k] = fl_shoulder_t79;
                 let fl_shoulder_t80 = table_0 * fl_shoulder_t75;
                 let fl_shoulder_t81 = fl_shoulder_minus_mp_ry_z + fl_shoulder_t74;
                 let fl_shoulder_t82 = table_0 * fl_shoulder_t81;
                 let fl_shoulder_t83 = fl_shoulder_mp_ry_ry + fl_shoulder_t82;
+                branches2_56[k] = fl_shoulder_t83;
                 let fl_shoulder_t84 = table_0 * fl_shoulder_t76;
+                branches2_57[k] = fl_shoulder_t84;
                 let fl_shoulder_t85 = fl_shoulder_minus_mp_xx - fl_shoulder_t67;
                 let fl_shoulder_t86 = fl_shoulder_minus_mp_xx - fl_shoulder_t85;
+                branches2_58[k] = fl_shoulder_t86;
                 let fl_shoulder_t87 = fl_shoulder_t67 + fl_shoulder_t85;
+                branches2_59[k] = fl_shoulder_t87;
                 let fl_shoulder_t88 = fl_shoulder_mp_rx_x - fl_shoulder_t72;
                 let fl_shoulder_t89 = fl_shoulder_mp_rx_x - fl_shoulder_t88;
+                branches2_60[k] = fl_shoulder_t89;
                 let fl_shoulder_t90 = fl_shoulder_t72 + fl_shoulder_t88;
+                branches2_61[k] = fl_shoulder_t90;
                 let fl_shoulder_t91 = fl_shoulder_mp_rx_rx + fl_shoulder_t80;
                 let fl_shoulder_t92 = fl_shoulder_mp_rx_rx - fl_shoulder_t91;
+                branches2_62[k] = fl_shoulder_t92;
                 let fl_shoulder_t93 = fl_shoulder_t80 - fl_shoulder_t91;
+                branches2_63[k] = fl_shoulder_t93;
                 let fl_shoulder_t94 = row_0 * fl_upper_leg_minus_dp_x;
                 let fl_shoulder_t95 = row_1 * fl_upper_leg_minus_dp_x;
                 let fl_shoulder_t96 = row_0 * fl_upper_leg_dp_rx;
@@ -2923,317 +3135,253 @@ impl Solo12 {
                 let p_6 = given16[k];
                 let fl_shoulder_t106 = p_6 + fl_upper_leg_dp_ry;
                 let fl_shoulder_minus_e = fl_shoulder_minus_rho * fl_shoulder_t106;
+                branches2_64[k] = fl_shoulder_minus_e;
                 let fl_shoulder_t107 = fl_shoulder_minus_u_x * fl_shoulder_minus_e;
                 let fl_shoulder_minus_dp_x = fl_shoulder_t94 - fl_shoulder_t107;
+                branches2_65[k] = fl_shoulder_minus_dp_x;
                 let fl_shoulder_t108 = fl_shoulder_u_y * fl_shoulder_minus_e;
                 let fl_shoulder_dp_y = fl_shoulder_t95 - fl_shoulder_t108;
+                branches2_66[k] = fl_shoulder_dp_y;
                 let fl_shoulder_t109 = fl_upper_leg_minus_mp_ry_y * fl_shoulder_minus_e;
                 let fl_shoulder_minus_dp_z = fl_upper_leg_dp_y - fl_shoulder_t109;
+                branches2_67[k] = fl_shoulder_minus_dp_z;
                 let fl_shoulder_t110 = fl_shoulder_u_rx * fl_shoulder_minus_e;
                 let fl_shoulder_dp_rx = fl_shoulder_t103 - fl_shoulder_t110;
+                branches2_68[k] = fl_shoulder_dp_rx;
                 let fl_shoulder_t111 = fl_shoulder_minus_u_ry * fl_shoulder_minus_e;
                 let fl_shoulder_minus_dp_ry = fl_shoulder_t105 - fl_shoulder_t111;
+                branches2_69[k] = fl_shoulder_minus_dp_ry;
                 let fl_shoulder_t112 = table_0 * fl_shoulder_dp_y;
                 let fl_shoulder_t113 = p_6 + fl_shoulder_t112;
+                branches2_70[k] = fl_shoulder_t113;
                 let fl_shoulder_t114 = table_0 * fl_shoulder_minus_dp_z;
                 let fl_shoulder_t115 = fl_shoulder_minus_dp_ry - fl_shoulder_t114;
+                branches2_71[k] = fl_shoulder_t115;
                 let fl_shoulder_t116 = table_2 * row_1;
                 let fl_shoulder_t117 = fl_shoulder_t18 + fl_shoulder_t116;
+                branches2_72[k] = fl_shoulder_t117;
                 let fl_shoulder_t118 = table_2 * row_0;
                 let fl_shoulder_t119 = fl_shoulder_t16 - fl_shoulder_t118;
-                branches2[0][k] = fl_lower_leg_t0;
-                branches2[1][k] = fl_lower_leg_t1;
-                branches2[2][k] = fl_upper_leg_m_rx_z;
-                branches2[3][k] = fl_upper_leg_minus_m_ry_z;
-                branches2[4][k] = fl_upper_leg_t20;
-                branches2[5][k] = fl_upper_leg_t21;
-                branches2[6][k] = fl_upper_leg_t22;
-                branches2[7][k] = fl_upper_leg_t23;
-                branches2[8][k] = fl_upper_leg_t24;
-                branches2[9][k] = fl_upper_leg_minus_k_x;
-                branches2[10][k] = fl_upper_leg_k_y;
-                branches2[11][k] = fl_upper_leg_k_rx;
-                branches2[12][k] = fl_upper_leg_k_ry;
-                branches2[13][k] = fl_upper_leg_minus_mp_xx;
-                branches2[14][k] = fl_upper_leg_mp_xy;
-                branches2[15][k] = fl_upper_leg_mp_rx_x;
-                branches2[16][k] = fl_upper_leg_mp_ry_x;
-                branches2[17][k] = fl_upper_leg_minus_mp_yy;
-                branches2[18][k] = fl_upper_leg_minus_mp_rx_y;
-                branches2[19][k] = fl_upper_leg_minus_mp_ry_y;
-                branches2[20][k] = fl_upper_leg_mp_rx_rx;
-                branches2[21][k] = fl_upper_leg_minus_mp_rx_ry;
-                branches2[22][k] = fl_upper_leg_minus_mp_ry_ry;
-                branches2[23][k] = fl_upper_leg_t53;
-                branches2[24][k] = fl_upper_leg_e;
-                branches2[25][k] = fl_upper_leg_minus_dp_x;
-                branches2[26][k] = fl_upper_leg_dp_y;
-                branches2[27][k] = fl_upper_leg_dp_rx;
-                branches2[28][k] = fl_upper_leg_dp_ry;
-                branches2[29][k] = fl_shoulder_k_x;
-                branches2[30][k] = fl_shoulder_minus_k_y;
-                branches2[31][k] = fl_shoulder_k_z;
-                branches2[32][k] = fl_shoulder_minus_k_rx;
-                branches2[33][k] = fl_shoulder_k_ry;
-                branches2[34][k] = fl_shoulder_minus_mp_xx;
-                branches2[35][k] = fl_shoulder_mp_xy;
-                branches2[36][k] = fl_shoulder_minus_mp_xz;
-                branches2[37][k] = fl_shoulder_mp_rx_x;
-                branches2[38][k] = fl_shoulder_minus_mp_ry_x;
-                branches2[39][k] = fl_shoulder_minus_mp_yy;
-                branches2[40][k] = fl_shoulder_mp_yz;
-                branches2[41][k] = fl_shoulder_minus_mp_rx_y;
-                branches2[42][k] = fl_shoulder_mp_ry_y;
-                branches2[43][k] = fl_shoulder_mp_rx_z;
-                branches2[44][k] = fl_shoulder_minus_mp_ry_z;
-                branches2[45][k] = fl_shoulder_mp_rx_rx;
-                branches2[46][k] = fl_shoulder_minus_mp_rx_ry;
-                branches2[47][k] = fl_shoulder_mp_ry_ry;
-                branches2[48][k] = fl_shoulder_t68;
-                branches2[49][k] = fl_shoulder_t69;
-                branches2[50][k] = fl_shoulder_t71;
-                branches2[51][k] = fl_shoulder_t74;
-                branches2[52][k] = fl_shoulder_t75;
-                branches2[53][k] = fl_shoulder_t76;
-                branches2[54][k] = fl_shoulder_t77;
-                branches2[55][k] = fl_shoulder_t79;
-                branches2[56][k] = fl_shoulder_t83;
-                branches2[57][k] = fl_shoulder_t84;
-                branches2[58][k] = fl_shoulder_t86;
-                branches2[59][k] = fl_shoulder_t87;
-                branches2[60][k] = fl_shoulder_t89;
-                branches2[61][k] = fl_shoulder_t90;
-                branches2[62][k] = fl_shoulder_t92;
-                branches2[63][k] = fl_shoulder_t93;
-                branches2[64][k] = fl_shoulder_minus_e;
-                branches2[65][k] = fl_shoulder_minus_dp_x;
-                branches2[66][k] = fl_shoulder_dp_y;
-                branches2[67][k] = fl_shoulder_minus_dp_z;
-                branches2[68][k] = fl_shoulder_dp_rx;
-                branches2[69][k] = fl_shoulder_minus_dp_ry;
-                branches2[70][k] = fl_shoulder_t113;
-                branches2[71][k] = fl_shoulder_t115;
-                branches2[72][k] = fl_shoulder_t117;
-                branches2[73][k] = fl_shoulder_t119;
+                branches2_73[k] = fl_shoulder_t119;
             }
         }
         {
-            let branch3_row_64 = branches2[58][3];
+            let branch3_row_64 = branches2_58[3];
             // HR_LOWER_LEG: sine and cosine, rotation
             let hr_lower_leg_t0 = branch3_row_64 - 2.50000279;
-            let branch3_row_65 = branches2[59][3];
+            let branch3_row_65 = branches2_59[3];
             let hr_lower_leg_t1 = branch3_row_65 - 2.50000279;
-            let branch3_row_54 = branches2[48][3];
+            let branch3_row_54 = branches2_48[3];
             let hr_lower_leg_t2 = branch3_row_54 - 2.50000279;
-            let branch3_row_68 = branches2[62][3];
+            let branch3_row_68 = branches2_62[3];
             let hr_lower_leg_t3 = branch3_row_68 + 0.016036324706249997;
-            let branch3_row_69 = branches2[63][3];
+            let branch3_row_69 = branches2_63[3];
             let hr_lower_leg_t4 = branch3_row_69 - 0.05721008180454845;
-            let branch3_row_62 = branches2[56][3];
+            let branch3_row_62 = branches2_56[3];
             let hr_lower_leg_t5 = branch3_row_62 + 0.07284082651079846;
-            let branch2_row_64 = branches2[58][2];
+            let branch2_row_64 = branches2_58[2];
             let hr_lower_leg_t6 = branch2_row_64 + hr_lower_leg_t0;
-            let branch2_row_42 = branches2[36][2];
-            let branch3_row_42 = branches2[36][3];
+            let branch2_row_42 = branches2_36[2];
+            let branch3_row_42 = branches2_36[3];
             let hr_lower_leg_t7 = branch2_row_42 + branch3_row_42;
-            let branch2_row_46 = branches2[40][2];
-            let branch3_row_46 = branches2[40][3];
+            let branch2_row_46 = branches2_40[2];
+            let branch3_row_46 = branches2_40[3];
             let hr_lower_leg_t8 = branch2_row_46 + branch3_row_46;
-            let branch2_row_65 = branches2[59][2];
+            let branch2_row_65 = branches2_59[2];
             let hr_lower_leg_t9 = branch2_row_65 + hr_lower_leg_t1;
-            let branch2_row_41 = branches2[35][2];
-            let branch3_row_41 = branches2[35][3];
+            let branch2_row_41 = branches2_35[2];
+            let branch3_row_41 = branches2_35[3];
             let hr_lower_leg_t10 = branch2_row_41 + branch3_row_41;
-            let branch2_row_54 = branches2[48][2];
+            let branch2_row_54 = branches2_48[2];
             let hr_lower_leg_t11 = branch2_row_54 + hr_lower_leg_t2;
-            let branch2_row_66 = branches2[60][2];
-            let branch3_row_66 = branches2[60][3];
+            let branch2_row_66 = branches2_60[2];
+            let branch3_row_66 = branches2_60[3];
             let hr_lower_leg_t12 = branch2_row_66 + branch3_row_66;
-            let branch2_row_55 = branches2[49][2];
-            let branch3_row_55 = branches2[49][3];
+            let branch2_row_55 = branches2_49[2];
+            let branch3_row_55 = branches2_49[3];
             let hr_lower_leg_t13 = branch2_row_55 + branch3_row_55;
-            let branch2_row_58 = branches2[52][2];
-            let branch3_row_58 = branches2[52][3];
+            let branch2_row_58 = branches2_52[2];
+            let branch3_row_58 = branches2_52[3];
             let hr_lower_leg_t14 = branch2_row_58 + branch3_row_58;
-            let branch2_row_49 = branches2[43][2];
-            let branch3_row_49 = branches2[43][3];
+            let branch2_row_49 = branches2_43[2];
+            let branch3_row_49 = branches2_43[3];
             let hr_lower_leg_t15 = branch2_row_49 + branch3_row_49;
-            let branch2_row_67 = branches2[61][2];
-            let branch3_row_67 = branches2[61][3];
+            let branch2_row_67 = branches2_61[2];
+            let branch3_row_67 = branches2_61[3];
             let hr_lower_leg_t16 = branch2_row_67 + branch3_row_67;
-            let branch2_row_47 = branches2[41][2];
-            let branch3_row_47 = branches2[41][3];
+            let branch2_row_47 = branches2_41[2];
+            let branch3_row_47 = branches2_41[3];
             let hr_lower_leg_t17 = branch2_row_47 + branch3_row_47;
-            let branch2_row_57 = branches2[51][2];
-            let branch3_row_57 = branches2[51][3];
+            let branch2_row_57 = branches2_51[2];
+            let branch3_row_57 = branches2_51[3];
             let hr_lower_leg_t18 = branch2_row_57 + branch3_row_57;
-            let branch2_row_56 = branches2[50][2];
-            let branch3_row_56 = branches2[50][3];
+            let branch2_row_56 = branches2_50[2];
+            let branch3_row_56 = branches2_50[3];
             let hr_lower_leg_t19 = branch2_row_56 + branch3_row_56;
-            let branch2_row_59 = branches2[53][2];
-            let branch3_row_59 = branches2[53][3];
+            let branch2_row_59 = branches2_53[2];
+            let branch3_row_59 = branches2_53[3];
             let hr_lower_leg_t20 = branch2_row_59 + branch3_row_59;
-            let branch2_row_68 = branches2[62][2];
+            let branch2_row_68 = branches2_62[2];
             let hr_lower_leg_t21 = branch2_row_68 + hr_lower_leg_t3;
-            let branch2_row_60 = branches2[54][2];
-            let branch3_row_60 = branches2[54][3];
+            let branch2_row_60 = branches2_54[2];
+            let branch3_row_60 = branches2_54[3];
             let hr_lower_leg_t22 = branch2_row_60 + branch3_row_60;
-            let branch2_row_63 = branches2[57][2];
-            let branch3_row_63 = branches2[57][3];
+            let branch2_row_63 = branches2_57[2];
+            let branch3_row_63 = branches2_57[3];
             let hr_lower_leg_t23 = branch2_row_63 + branch3_row_63;
-            let branch2_row_69 = branches2[63][2];
+            let branch2_row_69 = branches2_63[2];
             let hr_lower_leg_t24 = branch2_row_69 + hr_lower_leg_t4;
-            let branch2_row_61 = branches2[55][2];
-            let branch3_row_61 = branches2[55][3];
+            let branch2_row_61 = branches2_55[2];
+            let branch3_row_61 = branches2_55[3];
             let hr_lower_leg_t25 = branch2_row_61 + branch3_row_61;
-            let branch2_row_62 = branches2[56][2];
+            let branch2_row_62 = branches2_56[2];
             let hr_lower_leg_t26 = branch2_row_62 + hr_lower_leg_t5;
-            let branch2_row_73 = branches2[67][2];
-            let branch3_row_73 = branches2[67][3];
+            let branch2_row_73 = branches2_67[2];
+            let branch3_row_73 = branches2_67[3];
             let hr_lower_leg_t27 = branch2_row_73 + branch3_row_73;
-            let branch2_row_71 = branches2[65][2];
-            let branch3_row_71 = branches2[65][3];
+            let branch2_row_71 = branches2_65[2];
+            let branch3_row_71 = branches2_65[3];
             let hr_lower_leg_t28 = branch2_row_71 + branch3_row_71;
-            let branch2_row_72 = branches2[66][2];
-            let branch3_row_72 = branches2[66][3];
+            let branch2_row_72 = branches2_66[2];
+            let branch3_row_72 = branches2_66[3];
             let hr_lower_leg_t29 = branch2_row_72 + branch3_row_72;
-            let branch2_row_76 = branches2[70][2];
-            let branch3_row_76 = branches2[70][3];
+            let branch2_row_76 = branches2_70[2];
+            let branch3_row_76 = branches2_70[3];
             let hr_lower_leg_t30 = branch2_row_76 + branch3_row_76;
-            let branch2_row_74 = branches2[68][2];
-            let branch3_row_74 = branches2[68][3];
+            let branch2_row_74 = branches2_68[2];
+            let branch3_row_74 = branches2_68[3];
             let hr_lower_leg_t31 = branch2_row_74 + branch3_row_74;
-            let branch2_row_77 = branches2[71][2];
-            let branch3_row_77 = branches2[71][3];
+            let branch2_row_77 = branches2_71[2];
+            let branch3_row_77 = branches2_71[3];
             let hr_lower_leg_t32 = branch2_row_77 + branch3_row_77;
-            let branch2_row_8 = branches2[2][2];
-            let branch3_row_8 = branches2[2][3];
+            let branch2_row_8 = branches2_2[2];
+            let branch3_row_8 = branches2_2[3];
             let hr_lower_leg_t33 = branch2_row_8 + branch3_row_8;
-            let branch2_row_78 = branches2[72][2];
-            let branch3_row_78 = branches2[72][3];
+            let branch2_row_78 = branches2_72[2];
+            let branch3_row_78 = branches2_72[3];
             let hr_lower_leg_t34 = branch2_row_78 + branch3_row_78;
-            let branch2_row_79 = branches2[73][2];
-            let branch3_row_79 = branches2[73][3];
+            let branch2_row_79 = branches2_73[2];
+            let branch3_row_79 = branches2_73[3];
             let hr_lower_leg_t35 = branch2_row_79 + branch3_row_79;
-            let branch1_row_64 = branches2[58][1];
+            let branch1_row_64 = branches2_58[1];
             let hr_lower_leg_t36 = branch1_row_64 + hr_lower_leg_t6;
-            let branch1_row_42 = branches2[36][1];
+            let branch1_row_42 = branches2_36[1];
             let hr_lower_leg_t37 = branch1_row_42 + hr_lower_leg_t7;
-            let branch1_row_46 = branches2[40][1];
+            let branch1_row_46 = branches2_40[1];
             let hr_lower_leg_t38 = branch1_row_46 + hr_lower_leg_t8;
-            let branch1_row_65 = branches2[59][1];
+            let branch1_row_65 = branches2_59[1];
             let hr_lower_leg_t39 = branch1_row_65 + hr_lower_leg_t9;
-            let branch1_row_41 = branches2[35][1];
+            let branch1_row_41 = branches2_35[1];
             let hr_lower_leg_t40 = branch1_row_41 + hr_lower_leg_t10;
-            let branch1_row_54 = branches2[48][1];
+            let branch1_row_54 = branches2_48[1];
             let hr_lower_leg_t41 = branch1_row_54 + hr_lower_leg_t11;
-            let branch1_row_66 = branches2[60][1];
+            let branch1_row_66 = branches2_60[1];
             let hr_lower_leg_t42 = branch1_row_66 + hr_lower_leg_t12;
-            let branch1_row_55 = branches2[49][1];
+            let branch1_row_55 = branches2_49[1];
             let hr_lower_leg_t43 = branch1_row_55 + hr_lower_leg_t13;
-            let branch1_row_58 = branches2[52][1];
+            let branch1_row_58 = branches2_52[1];
             let hr_lower_leg_t44 = branch1_row_58 + hr_lower_leg_t14;
-            let branch1_row_49 = branches2[43][1];
+            let branch1_row_49 = branches2_43[1];
             let hr_lower_leg_t45 = branch1_row_49 + hr_lower_leg_t15;
-            let branch1_row_67 = branches2[61][1];
+            let branch1_row_67 = branches2_61[1];
             let hr_lower_leg_t46 = branch1_row_67 + hr_lower_leg_t16;
-            let branch1_row_47 = branches2[41][1];
+            let branch1_row_47 = branches2_41[1];
             let hr_lower_leg_t47 = branch1_row_47 + hr_lower_leg_t17;
-            let branch1_row_57 = branches2[51][1];
+            let branch1_row_57 = branches2_51[1];
             let hr_lower_leg_t48 = branch1_row_57 + hr_lower_leg_t18;
-            let branch1_row_56 = branches2[50][1];
+            let branch1_row_56 = branches2_50[1];
             let hr_lower_leg_t49 = branch1_row_56 + hr_lower_leg_t19;
-            let branch1_row_59 = branches2[53][1];
+            let branch1_row_59 = branches2_53[1];
             let hr_lower_leg_t50 = branch1_row_59 + hr_lower_leg_t20;
-            let branch1_row_68 = branches2[62][1];
+            let branch1_row_68 = branches2_62[1];
             let hr_lower_leg_t51 = branch1_row_68 + hr_lower_leg_t21;
-            let branch1_row_60 = branches2[54][1];
+            let branch1_row_60 = branches2_54[1];
             let hr_lower_leg_t52 = branch1_row_60 + hr_lower_leg_t22;
-            let branch1_row_63 = branches2[57][1];
+            let branch1_row_63 = branches2_57[1];
             let hr_lower_leg_t53 = branch1_row_63 + hr_lower_leg_t23;
-            let branch1_row_69 = branches2[63][1];
+            let branch1_row_69 = branches2_63[1];
             let hr_lower_leg_t54 = branch1_row_69 + hr_lower_leg_t24;
-            let branch1_row_61 = branches2[55][1];
+            let branch1_row_61 = branches2_55[1];
             let hr_lower_leg_t55 = branch1_row_61 + hr_lower_leg_t25;
-            let branch1_row_62 = branches2[56][1];
+            let branch1_row_62 = branches2_56[1];
             let hr_lower_leg_t56 = branch1_row_62 + hr_lower_leg_t26;
-            let branch1_row_73 = branches2[67][1];
+            let branch1_row_73 = branches2_67[1];
             let hr_lower_leg_t57 = branch1_row_73 + hr_lower_leg_t27;
-            let branch1_row_71 = branches2[65][1];
+            let branch1_row_71 = branches2_65[1];
             let hr_lower_leg_t58 = branch1_row_71 + hr_lower_leg_t28;
-            let branch1_row_72 = branches2[66][1];
+            let branch1_row_72 = branches2_66[1];
             let hr_lower_leg_t59 = branch1_row_72 + hr_lower_leg_t29;
-            let branch1_row_76 = branches2[70][1];
+            let branch1_row_76 = branches2_70[1];
             let hr_lower_leg_t60 = branch1_row_76 + hr_lower_leg_t30;
-            let branch1_row_74 = branches2[68][1];
+            let branch1_row_74 = branches2_68[1];
             let hr_lower_leg_t61 = branch1_row_74 + hr_lower_leg_t31;
-            let branch1_row_77 = branches2[71][1];
+            let branch1_row_77 = branches2_71[1];
             let hr_lower_leg_t62 = branch1_row_77 + hr_lower_leg_t32;
-            let branch1_row_8 = branches2[2][1];
+            let branch1_row_8 = branches2_2[1];
             let hr_lower_leg_t63 = branch1_row_8 + hr_lower_leg_t33;
-            let branch1_row_78 = branches2[72][1];
+            let branch1_row_78 = branches2_72[1];
             let hr_lower_leg_t64 = branch1_row_78 + hr_lower_leg_t34;
-            let branch1_row_79 = branches2[73][1];
+            let branch1_row_79 = branches2_73[1];
             let hr_lower_leg_t65 = branch1_row_79 + hr_lower_leg_t35;
-            let branch0_row_64 = branches2[58][0];
+            let branch0_row_64 = branches2_58[0];
             let base_link_minus_m_xx = branch0_row_64 + hr_lower_leg_t36;
-            let branch0_row_42 = branches2[36][0];
+            let branch0_row_42 = branches2_36[0];
             let base_link_minus_m_xy = branch0_row_42 + hr_lower_leg_t37;
-            let branch0_row_46 = branches2[40][0];
+            let branch0_row_46 = branches2_40[0];
             let base_link_m_xz = branch0_row_46 + hr_lower_leg_t38;
-            let branch0_row_65 = branches2[59][0];
+            let branch0_row_65 = branches2_59[0];
             let base_link_minus_m_yy = branch0_row_65 + hr_lower_leg_t39;
-            let branch0_row_41 = branches2[35][0];
+            let branch0_row_41 = branches2_35[0];
             let base_link_m_yz = branch0_row_41 + hr_lower_leg_t40;
-            let branch0_row_54 = branches2[48][0];
+            let branch0_row_54 = branches2_48[0];
             let base_link_minus_m_zz = branch0_row_54 + hr_lower_leg_t41;
-            let branch0_row_66 = branches2[60][0];
+            let branch0_row_66 = branches2_60[0];
             let base_link_m_rx_x = branch0_row_66 + hr_lower_leg_t42;
-            let branch0_row_55 = branches2[49][0];
+            let branch0_row_55 = branches2_49[0];
             let base_link_m_rx_y = branch0_row_55 + hr_lower_leg_t43;
-            let branch0_row_58 = branches2[52][0];
+            let branch0_row_58 = branches2_52[0];
             let base_link_minus_m_rx_z = branch0_row_58 + hr_lower_leg_t44;
-            let branch0_row_49 = branches2[43][0];
+            let branch0_row_49 = branches2_43[0];
             let base_link_m_ry_x = branch0_row_49 + hr_lower_leg_t45;
-            let branch0_row_67 = branches2[61][0];
+            let branch0_row_67 = branches2_61[0];
             let base_link_m_ry_y = branch0_row_67 + hr_lower_leg_t46;
-            let branch0_row_47 = branches2[41][0];
+            let branch0_row_47 = branches2_41[0];
             let base_link_minus_m_ry_z = branch0_row_47 + hr_lower_leg_t47;
-            let branch0_row_57 = branches2[51][0];
+            let branch0_row_57 = branches2_51[0];
             let base_link_minus_m_rz_x = branch0_row_57 + hr_lower_leg_t48;
-            let branch0_row_56 = branches2[50][0];
+            let branch0_row_56 = branches2_50[0];
             let base_link_minus_m_rz_y = branch0_row_56 + hr_lower_leg_t49;
-            let branch0_row_59 = branches2[53][0];
+            let branch0_row_59 = branches2_53[0];
             let base_link_m_rz_z = branch0_row_59 + hr_lower_leg_t50;
-            let branch0_row_68 = branches2[62][0];
+            let branch0_row_68 = branches2_62[0];
             let base_link_m_rx_rx = branch0_row_68 + hr_lower_leg_t51;
-            let branch0_row_60 = branches2[54][0];
+            let branch0_row_60 = branches2_54[0];
             let base_link_minus_m_rx_ry = branch0_row_60 + hr_lower_leg_t52;
-            let branch0_row_63 = branches2[57][0];
+            let branch0_row_63 = branches2_57[0];
             let base_link_m_rx_rz = branch0_row_63 + hr_lower_leg_t53;
-            let branch0_row_69 = branches2[63][0];
+            let branch0_row_69 = branches2_63[0];
             let base_link_minus_m_ry_ry = branch0_row_69 + hr_lower_leg_t54;
-            let branch0_row_61 = branches2[55][0];
+            let branch0_row_61 = branches2_55[0];
             let base_link_minus_m_ry_rz = branch0_row_61 + hr_lower_leg_t55;
-            let branch0_row_62 = branches2[56][0];
+            let branch0_row_62 = branches2_56[0];
             let base_link_m_rz_rz = branch0_row_62 + hr_lower_leg_t56;
-            let branch0_row_73 = branches2[67][0];
+            let branch0_row_73 = branches2_67[0];
             let base_link_minus_d_x = branch0_row_73 + hr_lower_leg_t57;
-            let branch0_row_71 = branches2[65][0];
+            let branch0_row_71 = branches2_65[0];
             let base_link_minus_d_y = branch0_row_71 + hr_lower_leg_t58;
-            let branch0_row_72 = branches2[66][0];
+            let branch0_row_72 = branches2_66[0];
             let base_link_d_z = branch0_row_72 + hr_lower_leg_t59;
-            let branch0_row_76 = branches2[70][0];
+            let branch0_row_76 = branches2_70[0];
             let base_link_d_rx = branch0_row_76 + hr_lower_leg_t60;
-            let branch0_row_74 = branches2[68][0];
+            let branch0_row_74 = branches2_68[0];
             let base_link_d_ry = branch0_row_74 + hr_lower_leg_t61;
-            let branch0_row_77 = branches2[71][0];
+            let branch0_row_77 = branches2_71[0];
             let base_link_minus_d_rz = branch0_row_77 + hr_lower_leg_t62;
-            let branch0_row_8 = branches2[2][0];
+            let branch0_row_8 = branches2_2[0];
             let base_link_minus_s_x = branch0_row_8 + hr_lower_leg_t63;
-            let branch0_row_78 = branches2[72][0];
+            let branch0_row_78 = branches2_72[0];
             let base_link_s_y = branch0_row_78 + hr_lower_leg_t64;
-            let branch0_row_79 = branches2[73][0];
+            let branch0_row_79 = branches2_73[0];
             let base_link_minus_s_z = branch0_row_79 + hr_lower_leg_t65;
             // base_link: U, Mj, k and the reduced inertia M' (4.44)
             let base_link_minus_rho = 1.0 / base_link_minus_m_xx;
@@ -3376,19 +3524,23 @@ impl Solo12 {
             let p_5 = p.get(5, 0);
             let base_link_t90 = p_5 + base_link_t89;
             let base_link_e_2 = base_link_rho_2 * base_link_t90;
+            kept[9] = base_link_e_2;
             // base_link: velocity and joint rate (4.40)
             let base_link_t91 = base_link_k_rz_4 * base_link_e_2;
             let base_link_minus_v = base_link_minus_e_4 + base_link_t91;
+            kept[10] = base_link_minus_v;
             let base_link_t92 = base_link_minus_k_ry_3 * base_link_minus_v;
             let base_link_t93 = base_link_k_rz_3 * base_link_e_2;
             let base_link_t94 = base_link_t92 + base_link_t93;
             let base_link_v = base_link_e - base_link_t94;
+            kept[11] = base_link_v;
             let base_link_t95 = base_link_k_rx * base_link_v;
             let base_link_t96 = base_link_k_ry * base_link_minus_v;
             let base_link_t97 = base_link_t95 - base_link_t96;
             let base_link_t98 = base_link_minus_k_rz * base_link_e_2;
             let base_link_t99 = base_link_t97 - base_link_t98;
             let base_link_minus_v_2 = base_link_minus_e_3 + base_link_t99;
+            kept[12] = base_link_minus_v_2;
             let base_link_t100 = base_link_minus_k_z_2 * base_link_minus_v_2;
             let base_link_t101 = base_link_minus_k_rx_2 * base_link_v;
             let base_link_t102 = base_link_minus_k_ry_2 * base_link_minus_v;
@@ -3397,6 +3549,7 @@ impl Solo12 {
             let base_link_t105 = base_link_t103 - base_link_t104;
             let base_link_t106 = base_link_t100 - base_link_t105;
             let base_link_minus_v_3 = base_link_minus_e_2 + base_link_t106;
+            kept[13] = base_link_minus_v_3;
             let base_link_t107 = base_link_k_y * base_link_minus_v_3;
             let base_link_t108 = base_link_minus_k_z * base_link_minus_v_2;
             let base_link_t109 = base_link_t107 - base_link_t108;
@@ -3407,6 +3560,7 @@ impl Solo12 {
             let base_link_t114 = base_link_t112 - base_link_t113;
             let base_link_t115 = base_link_t109 + base_link_t114;
             let base_link_minus_v_4 = base_link_minus_e - base_link_t115;
+            kept[14] = base_link_minus_v_4;
             let kept_0 = kept[0];
             // base_link: coordinate rates
             let base_link_t116 = kept_0 * base_link_minus_v_4;
@@ -3416,6 +3570,7 @@ impl Solo12 {
             let kept_2 = kept[2];
             let base_link_t119 = kept_2 * base_link_minus_v_2;
             let base_link_t120 = base_link_t118 - base_link_t119;
+            qd.set(0, 0, base_link_t120);
             let kept_3 = kept[3];
             let base_link_t121 = kept_3 * base_link_minus_v_4;
             let kept_4 = kept[4];
@@ -3424,6 +3579,7 @@ impl Solo12 {
             let kept_5 = kept[5];
             let base_link_t124 = kept_5 * base_link_minus_v_2;
             let base_link_t125 = base_link_t123 + base_link_t124;
+            qd.set(1, 0, -base_link_t125);
             let kept_6 = kept[6];
             let base_link_t126 = kept_6 * base_link_minus_v_4;
             let kept_7 = kept[7];
@@ -3432,6 +3588,7 @@ impl Solo12 {
             let kept_8 = kept[8];
             let base_link_t129 = kept_8 * base_link_minus_v_2;
             let base_link_t130 = base_link_t129 - base_link_t128;
+            qd.set(2, 0, base_link_t130);
             let q_4 = q.get(4, 0);
             let base_link_t131 = q_4 * base_link_e_2;
             let q_5 = q.get(5, 0);
@@ -3448,22 +3605,29 @@ impl Solo12 {
             let base_link_t140 = q_6 * base_link_v;
             let base_link_t141 = base_link_t133 + base_link_t140;
             let base_link_t142 = 0.5 * base_link_t141;
+            qd.set(3, 0, base_link_t142);
             let base_link_t143 = q_6 * base_link_minus_v;
             let base_link_t144 = base_link_t136 - base_link_t143;
             let base_link_t145 = 0.5 * base_link_t144;
+            qd.set(4, 0, base_link_t145);
             let base_link_t146 = q_6 * base_link_e_2;
             let base_link_t147 = base_link_t139 - base_link_t146;
             let base_link_t148 = 0.5 * base_link_t147;
+            qd.set(5, 0, -base_link_t148);
             let base_link_t149 = q_3 * base_link_v;
             let base_link_t150 = q_4 * base_link_minus_v;
             let base_link_t151 = base_link_t149 - base_link_t150;
             let base_link_t152 = q_5 * base_link_e_2;
             let base_link_t153 = base_link_t151 + base_link_t152;
             let base_link_t154 = 0.5 * base_link_t153;
+            qd.set(6, 0, -base_link_t154);
             // base_link: gravity and wrenches
             let base_link_minus_g_x = 9.81 * kept_6;
+            kept[15] = base_link_minus_g_x;
             let base_link_minus_g_y = 9.81 * kept_7;
+            kept[16] = base_link_minus_g_y;
             let base_link_g_z = 9.81 * kept_8;
+            kept[17] = base_link_g_z;
             // base_link: momentum rate (4.36)
             let base_link_t155 = p_2 * base_link_minus_v;
             let base_link_t156 = p_1 * base_link_e_2;
@@ -3508,35 +3672,24 @@ impl Solo12 {
             let base_link_t195 = base_link_s_y * base_link_minus_g_x;
             let base_link_t196 = base_link_t194 + base_link_t195;
             let base_link_t197 = base_link_t157 - base_link_t185;
-            let base_link_t198 = base_link_t160 + base_link_t186;
-            let base_link_t199 = base_link_t163 - base_link_t187;
-            let base_link_t200 = base_link_t182 + base_link_t190;
-            let base_link_t201 = base_link_t183 + base_link_t193;
-            let base_link_t202 = base_link_t184 + base_link_t196;
-            qd.set(0, 0, base_link_t120);
-            qd.set(1, 0, -base_link_t125);
-            qd.set(2, 0, base_link_t130);
-            qd.set(3, 0, base_link_t142);
-            qd.set(4, 0, base_link_t145);
-            qd.set(5, 0, -base_link_t148);
-            qd.set(6, 0, -base_link_t154);
-            kept[9] = base_link_e_2;
-            kept[10] = base_link_minus_v;
-            kept[11] = base_link_v;
-            kept[12] = base_link_minus_v_2;
-            kept[13] = base_link_minus_v_3;
-            kept[14] = base_link_minus_v_4;
-            kept[15] = base_link_minus_g_x;
-            kept[16] = base_link_minus_g_y;
-            kept[17] = base_link_g_z;
             kept[18] = base_link_t197;
+            let base_link_t198 = base_link_t160 + base_link_t186;
             kept[19] = base_link_t198;
+            let base_link_t199 = base_link_t163 - base_link_t187;
             kept[20] = base_link_t199;
+            let base_link_t200 = base_link_t182 + base_link_t190;
             kept[21] = base_link_t200;
+            let base_link_t201 = base_link_t183 + base_link_t193;
             kept[22] = base_link_t201;
+            let base_link_t202 = base_link_t184 + base_link_t196;
             kept[23] = base_link_t202;
         }
-        let mut branches4 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut branches4_0 = [0.0; LANES];
+        let mut branches4_1 = [0.0; LANES];
+        let mut branches4_2 = [0.0; LANES];
+        let mut branches4_3 = [0.0; LANES];
+        let mut branches4_4 = [0.0; LANES];
+        let mut branches4_5 = [0.0; LANES];
         {
             let given70 = [tau.get(6, 0), tau.get(9, 0), tau.get(12, 0), tau.get(15, 0)];
             let given71 = [tau.get(7, 0), tau.get(10, 0), tau.get(13, 0), tau.get(16, 0)];
@@ -3552,25 +3705,26 @@ impl Solo12 {
                 let fl_shoulder_t1 = table_0 * carried_3;
                 let carried_2 = -kept[12];
                 let fl_shoulder_hat_y = carried_2 + fl_shoulder_t1;
-                let row_35 = branches2[29][k];
+                let row_35 = branches2_29[k];
                 let carried_1 = -kept[13];
                 let fl_shoulder_t2 = row_35 * carried_1;
-                let row_36 = branches2[30][k];
+                let row_36 = branches2_30[k];
                 let fl_shoulder_t3 = row_36 * fl_shoulder_hat_y;
                 let fl_shoulder_t4 = fl_shoulder_t2 - fl_shoulder_t3;
-                let row_37 = branches2[31][k];
+                let row_37 = branches2_31[k];
                 let fl_shoulder_t5 = row_37 * fl_shoulder_hat_z;
                 let fl_shoulder_t6 = fl_shoulder_t4 + fl_shoulder_t5;
-                let row_38 = branches2[32][k];
+                let row_38 = branches2_32[k];
                 let carried_4 = -kept[10];
                 let fl_shoulder_t7 = row_38 * carried_4;
-                let row_39 = branches2[33][k];
+                let row_39 = branches2_33[k];
                 let fl_shoulder_t8 = row_39 * carried_5;
                 let fl_shoulder_t9 = fl_shoulder_t7 - fl_shoulder_t8;
                 let fl_shoulder_t10 = fl_shoulder_t6 - fl_shoulder_t9;
-                let row_70 = branches2[64][k];
+                let row_70 = branches2_64[k];
                 let fl_shoulder_minus_omega_rz = row_70 + fl_shoulder_t10;
                 let fl_shoulder_minus_v = carried_3 + fl_shoulder_minus_omega_rz;
+                branches4_0[k] = -fl_shoulder_minus_v;
                 let table_1 = table[1][k];
                 let fl_shoulder_t11 = table_1 * carried_5;
                 let fl_shoulder_t12 = carried_1 + fl_shoulder_t11;
@@ -3598,19 +3752,19 @@ impl Solo12 {
                 let fl_shoulder_t25 = row_0 * carried_8;
                 let fl_shoulder_t26 = row_1 * carried_7;
                 let fl_shoulder_g_y = fl_shoulder_t25 + fl_shoulder_t26;
-                let row_40 = branches2[34][k];
-                let row_45 = branches2[39][k];
+                let row_40 = branches2_34[k];
+                let row_45 = branches2_39[k];
                 let fl_shoulder_t27 = row_40 - row_45;
-                let row_43 = branches2[37][k];
-                let row_48 = branches2[42][k];
+                let row_43 = branches2_37[k];
+                let row_48 = branches2_42[k];
                 let fl_shoulder_t28 = row_43 - row_48;
-                let row_51 = branches2[45][k];
-                let row_53 = branches2[47][k];
+                let row_51 = branches2_45[k];
+                let row_53 = branches2_47[k];
                 let fl_shoulder_t29 = row_51 - row_53;
-                let row_44 = branches2[38][k];
-                let row_47 = branches2[41][k];
+                let row_44 = branches2_38[k];
+                let row_47 = branches2_41[k];
                 let fl_shoulder_t30 = row_44 + row_47;
-                let row_41 = branches2[35][k];
+                let row_41 = branches2_35[k];
                 let fl_shoulder_t31 = row_41 * carried_1;
                 let fl_shoulder_t32 = fl_shoulder_hat_y * fl_shoulder_t27;
                 let fl_shoulder_t33 = fl_shoulder_t31 + fl_shoulder_t32;
@@ -3618,35 +3772,35 @@ impl Solo12 {
                 let fl_shoulder_t35 = fl_shoulder_t33 - fl_shoulder_t34;
                 let fl_shoulder_t36 = carried_5 * fl_shoulder_t28;
                 let fl_shoulder_t37 = fl_shoulder_t35 - fl_shoulder_t36;
-                let row_46 = branches2[40][k];
+                let row_46 = branches2_40[k];
                 let fl_shoulder_t38 = row_46 * fl_shoulder_hat_z;
                 let fl_shoulder_t39 = fl_shoulder_t37 + fl_shoulder_t38;
-                let row_72 = branches2[66][k];
+                let row_72 = branches2_66[k];
                 let fl_shoulder_t40 = row_72 + fl_shoulder_t39;
                 let fl_shoulder_t41 = row_41 * fl_shoulder_hat_y;
                 let fl_shoulder_t42 = carried_5 * fl_shoulder_t30;
                 let fl_shoulder_t43 = fl_shoulder_t41 - fl_shoulder_t42;
                 let fl_shoulder_t44 = carried_4 * fl_shoulder_t28;
                 let fl_shoulder_t45 = fl_shoulder_t43 + fl_shoulder_t44;
-                let row_42 = branches2[36][k];
+                let row_42 = branches2_36[k];
                 let fl_shoulder_t46 = row_42 * fl_shoulder_hat_z;
                 let fl_shoulder_t47 = fl_shoulder_t45 - fl_shoulder_t46;
-                let row_71 = branches2[65][k];
+                let row_71 = branches2_65[k];
                 let fl_shoulder_t48 = row_71 - fl_shoulder_t47;
-                let row_52 = branches2[46][k];
+                let row_52 = branches2_46[k];
                 let fl_shoulder_t49 = row_52 * carried_4;
                 let fl_shoulder_t50 = carried_5 * fl_shoulder_t29;
                 let fl_shoulder_t51 = fl_shoulder_t49 + fl_shoulder_t50;
-                let row_50 = branches2[44][k];
+                let row_50 = branches2_44[k];
                 let fl_shoulder_t52 = row_50 * fl_shoulder_hat_z;
                 let fl_shoulder_t53 = fl_shoulder_t51 + fl_shoulder_t52;
-                let row_75 = branches2[69][k];
+                let row_75 = branches2_69[k];
                 let fl_shoulder_t54 = row_75 + fl_shoulder_t53;
                 let fl_shoulder_t55 = row_52 * carried_5;
-                let row_49 = branches2[43][k];
+                let row_49 = branches2_43[k];
                 let fl_shoulder_t56 = row_49 * fl_shoulder_hat_z;
                 let fl_shoulder_t57 = fl_shoulder_t55 - fl_shoulder_t56;
-                let row_74 = branches2[68][k];
+                let row_74 = branches2_68[k];
                 let fl_shoulder_t58 = row_74 - fl_shoulder_t57;
                 let fl_shoulder_t59 = carried_1 * fl_shoulder_t40;
                 let fl_shoulder_t60 = fl_shoulder_hat_y * fl_shoulder_t48;
@@ -3655,9 +3809,9 @@ impl Solo12 {
                 let fl_shoulder_t63 = fl_shoulder_t61 - fl_shoulder_t62;
                 let fl_shoulder_t64 = carried_5 * fl_shoulder_t58;
                 let fl_shoulder_t65 = fl_shoulder_t63 - fl_shoulder_t64;
-                let row_8 = branches2[2][k];
+                let row_8 = branches2_2[k];
                 let fl_shoulder_t66 = row_8 * fl_shoulder_g_x;
-                let row_9 = branches2[3][k];
+                let row_9 = branches2_3[k];
                 let carried_6 = -kept[15];
                 let fl_shoulder_t67 = row_9 * carried_6;
                 let fl_shoulder_t68 = fl_shoulder_t66 + fl_shoulder_t67;
@@ -3666,49 +3820,51 @@ impl Solo12 {
                 let fl_shoulder_t70 = table_2 * fl_shoulder_g_x;
                 let fl_shoulder_t71 = fl_shoulder_t69 - fl_shoulder_t70;
                 let fl_shoulder_t72 = fl_shoulder_t65 - fl_shoulder_t71;
-                let row_15 = branches2[9][k];
+                let row_15 = branches2_9[k];
                 let fl_upper_leg_t0 = row_15 * fl_shoulder_omega_x;
-                let row_16 = branches2[10][k];
+                let row_16 = branches2_10[k];
                 let fl_upper_leg_t1 = row_16 * fl_shoulder_hat_z;
                 let fl_upper_leg_t2 = fl_upper_leg_t0 + fl_upper_leg_t1;
-                let row_17 = branches2[11][k];
+                let row_17 = branches2_11[k];
                 let fl_upper_leg_t3 = row_17 * fl_shoulder_omega_rx;
-                let row_18 = branches2[12][k];
+                let row_18 = branches2_12[k];
                 let fl_upper_leg_t4 = row_18 * fl_shoulder_minus_omega_rz;
                 let fl_upper_leg_t5 = fl_upper_leg_t3 + fl_upper_leg_t4;
                 let fl_upper_leg_t6 = fl_upper_leg_t2 - fl_upper_leg_t5;
-                let row_30 = branches2[24][k];
+                let row_30 = branches2_24[k];
                 let fl_upper_leg_omega_rz = row_30 + fl_upper_leg_t6;
                 let fl_upper_leg_v = fl_upper_leg_omega_rz - fl_shoulder_omega_ry;
-                let row_10 = branches2[4][k];
+                branches4_1[k] = fl_upper_leg_v;
+                let row_10 = branches2_4[k];
                 let fl_upper_leg_t7 = row_10 * fl_shoulder_omega_x;
-                let row_11 = branches2[5][k];
+                let row_11 = branches2_5[k];
                 let fl_upper_leg_t8 = row_11 * fl_shoulder_hat_z;
                 let fl_upper_leg_t9 = fl_upper_leg_t7 + fl_upper_leg_t8;
-                let row_12 = branches2[6][k];
+                let row_12 = branches2_6[k];
                 let fl_upper_leg_t10 = row_12 * fl_shoulder_omega_rx;
-                let row_13 = branches2[7][k];
+                let row_13 = branches2_7[k];
                 let fl_upper_leg_t11 = row_13 * fl_shoulder_minus_omega_rz;
                 let fl_upper_leg_t12 = fl_upper_leg_t10 + fl_upper_leg_t11;
-                let row_14 = branches2[8][k];
+                let row_14 = branches2_8[k];
                 let fl_upper_leg_t13 = row_14 * fl_upper_leg_omega_rz;
                 let fl_upper_leg_t14 = fl_upper_leg_t12 + fl_upper_leg_t13;
                 let fl_upper_leg_t15 = fl_upper_leg_t9 - fl_upper_leg_t14;
-                let row_29 = branches2[23][k];
+                let row_29 = branches2_23[k];
                 let fl_lower_leg_v = row_29 + fl_upper_leg_t15;
-                let row_19 = branches2[13][k];
-                let row_23 = branches2[17][k];
+                branches4_2[k] = fl_lower_leg_v;
+                let row_19 = branches2_13[k];
+                let row_23 = branches2_17[k];
                 let fl_upper_leg_t16 = row_19 - row_23;
-                let row_21 = branches2[15][k];
-                let row_25 = branches2[19][k];
+                let row_21 = branches2_15[k];
+                let row_25 = branches2_19[k];
                 let fl_upper_leg_t17 = row_21 + row_25;
-                let row_26 = branches2[20][k];
-                let row_28 = branches2[22][k];
+                let row_26 = branches2_20[k];
+                let row_28 = branches2_22[k];
                 let fl_upper_leg_t18 = row_26 + row_28;
-                let row_22 = branches2[16][k];
-                let row_24 = branches2[18][k];
+                let row_22 = branches2_16[k];
+                let row_24 = branches2_18[k];
                 let fl_upper_leg_t19 = row_22 - row_24;
-                let row_20 = branches2[14][k];
+                let row_20 = branches2_14[k];
                 let fl_upper_leg_t20 = row_20 * fl_shoulder_omega_x;
                 let fl_upper_leg_t21 = fl_shoulder_hat_z * fl_upper_leg_t16;
                 let fl_upper_leg_t22 = fl_upper_leg_t20 - fl_upper_leg_t21;
@@ -3716,27 +3872,27 @@ impl Solo12 {
                 let fl_upper_leg_t24 = fl_upper_leg_t22 + fl_upper_leg_t23;
                 let fl_upper_leg_t25 = fl_shoulder_minus_omega_rz * fl_upper_leg_t17;
                 let fl_upper_leg_t26 = fl_upper_leg_t24 - fl_upper_leg_t25;
-                let row_32 = branches2[26][k];
+                let row_32 = branches2_26[k];
                 let fl_upper_leg_t27 = row_32 + fl_upper_leg_t26;
                 let fl_upper_leg_t28 = row_20 * fl_shoulder_hat_z;
                 let fl_upper_leg_t29 = fl_shoulder_minus_omega_rz * fl_upper_leg_t19;
                 let fl_upper_leg_t30 = fl_upper_leg_t28 - fl_upper_leg_t29;
                 let fl_upper_leg_t31 = fl_shoulder_omega_rx * fl_upper_leg_t17;
                 let fl_upper_leg_t32 = fl_upper_leg_t30 - fl_upper_leg_t31;
-                let row_31 = branches2[25][k];
+                let row_31 = branches2_25[k];
                 let fl_upper_leg_t33 = row_31 + fl_upper_leg_t32;
-                let row_27 = branches2[21][k];
+                let row_27 = branches2_21[k];
                 let fl_upper_leg_t34 = row_27 * fl_shoulder_omega_rx;
                 let fl_upper_leg_t35 = fl_shoulder_minus_omega_rz * fl_upper_leg_t18;
                 let fl_upper_leg_t36 = fl_upper_leg_t34 + fl_upper_leg_t35;
                 let fl_upper_leg_t37 = row_9 * fl_shoulder_omega_y;
                 let fl_upper_leg_t38 = fl_upper_leg_t36 + fl_upper_leg_t37;
-                let row_34 = branches2[28][k];
+                let row_34 = branches2_28[k];
                 let fl_upper_leg_t39 = row_34 - fl_upper_leg_t38;
                 let fl_upper_leg_t40 = row_27 * fl_shoulder_minus_omega_rz;
                 let fl_upper_leg_t41 = row_8 * fl_shoulder_omega_y;
                 let fl_upper_leg_t42 = fl_upper_leg_t40 - fl_upper_leg_t41;
-                let row_33 = branches2[27][k];
+                let row_33 = branches2_27[k];
                 let fl_upper_leg_t43 = row_33 - fl_upper_leg_t42;
                 let fl_upper_leg_t44 = fl_shoulder_omega_x * fl_upper_leg_t27;
                 let fl_upper_leg_t45 = fl_shoulder_hat_z * fl_upper_leg_t33;
@@ -3746,12 +3902,12 @@ impl Solo12 {
                 let fl_upper_leg_t49 = fl_shoulder_minus_omega_rz * fl_upper_leg_t43;
                 let fl_upper_leg_t50 = fl_upper_leg_t48 - fl_upper_leg_t49;
                 let fl_upper_leg_t51 = fl_shoulder_t68 + fl_upper_leg_t50;
-                let row_4 = branches2[0][k];
+                let row_4 = branches2_0[k];
                 let fl_lower_leg_t0 = row_4 * fl_upper_leg_omega_rz;
                 let fl_lower_leg_t1 = fl_shoulder_hat_z - fl_lower_leg_t0;
                 let fl_lower_leg_t2 = row_4 * fl_shoulder_minus_omega_rz;
                 let fl_lower_leg_t3 = fl_shoulder_omega_y - fl_lower_leg_t2;
-                let row_5 = branches2[1][k];
+                let row_5 = branches2_1[k];
                 let fl_lower_leg_t4 = row_5 * fl_shoulder_omega_rx;
                 let fl_lower_leg_hat_z = fl_lower_leg_t3 + fl_lower_leg_t4;
                 let fl_lower_leg_t5 = row_5 * fl_upper_leg_omega_rz;
@@ -3786,67 +3942,64 @@ impl Solo12 {
                 let fl_lower_leg_t26 = fl_lower_leg_t24 + fl_lower_leg_t25;
                 let tau_6 = given70[k];
                 let fl_lower_leg_t27 = tau_6 - fl_shoulder_t72;
+                branches4_3[k] = fl_lower_leg_t27;
                 let tau_7 = given71[k];
                 let fl_lower_leg_t28 = tau_7 - fl_upper_leg_t51;
+                branches4_4[k] = fl_lower_leg_t28;
                 let tau_8 = given72[k];
                 let fl_lower_leg_t29 = tau_8 - fl_lower_leg_t26;
-                branches4[0][k] = -fl_shoulder_minus_v;
-                branches4[1][k] = fl_upper_leg_v;
-                branches4[2][k] = fl_lower_leg_v;
-                branches4[3][k] = fl_lower_leg_t27;
-                branches4[4][k] = fl_lower_leg_t28;
-                branches4[5][k] = fl_lower_leg_t29;
+                branches4_5[k] = fl_lower_leg_t29;
             }
-            qd.set(7, 0, branches4[0][0]);
-            qd.set(10, 0, branches4[0][1]);
-            qd.set(13, 0, branches4[0][2]);
-            qd.set(16, 0, branches4[0][3]);
-            qd.set(8, 0, branches4[1][0]);
-            qd.set(11, 0, branches4[1][1]);
-            qd.set(14, 0, branches4[1][2]);
-            qd.set(17, 0, branches4[1][3]);
-            qd.set(9, 0, branches4[2][0]);
-            qd.set(12, 0, branches4[2][1]);
-            qd.set(15, 0, branches4[2][2]);
-            qd.set(18, 0, branches4[2][3]);
-            pd.set(6, 0, branches4[3][0]);
-            pd.set(9, 0, branches4[3][1]);
-            pd.set(12, 0, branches4[3][2]);
-            pd.set(15, 0, branches4[3][3]);
-            pd.set(7, 0, branches4[4][0]);
-            pd.set(10, 0, branches4[4][1]);
-            pd.set(13, 0, branches4[4][2]);
-            pd.set(16, 0, branches4[4][3]);
-            pd.set(8, 0, branches4[5][0]);
-            pd.set(11, 0, branches4[5][1]);
-            pd.set(14, 0, branches4[5][2]);
-            pd.set(17, 0, branches4[5][3]);
+            qd.set(7, 0, branches4_0[0]);
+            qd.set(10, 0, branches4_0[1]);
+            qd.set(13, 0, branches4_0[2]);
+            qd.set(16, 0, branches4_0[3]);
+            qd.set(8, 0, branches4_1[0]);
+            qd.set(11, 0, branches4_1[1]);
+            qd.set(14, 0, branches4_1[2]);
+            qd.set(17, 0, branches4_1[3]);
+            qd.set(9, 0, branches4_2[0]);
+            qd.set(12, 0, branches4_2[1]);
+            qd.set(15, 0, branches4_2[2]);
+            qd.set(18, 0, branches4_2[3]);
+            pd.set(6, 0, branches4_3[0]);
+            pd.set(9, 0, branches4_3[1]);
+            pd.set(12, 0, branches4_3[2]);
+            pd.set(15, 0, branches4_3[3]);
+            pd.set(7, 0, branches4_4[0]);
+            pd.set(10, 0, branches4_4[1]);
+            pd.set(13, 0, branches4_4[2]);
+            pd.set(16, 0, branches4_4[3]);
+            pd.set(8, 0, branches4_5[0]);
+            pd.set(11, 0, branches4_5[1]);
+            pd.set(14, 0, branches4_5[2]);
+            pd.set(17, 0, branches4_5[3]);
         }
         {
             let tau_0 = tau.get(0, 0);
             let kept_18 = kept[18];
             // base_link: momentum rate (4.36)
             let base_link_t0 = tau_0 + kept_18;
+            pd.set(0, 0, base_link_t0);
             let tau_1 = tau.get(1, 0);
             let kept_19 = kept[19];
             let base_link_t1 = tau_1 - kept_19;
+            pd.set(1, 0, base_link_t1);
             let tau_2 = tau.get(2, 0);
             let kept_20 = kept[20];
             let base_link_t2 = tau_2 - kept_20;
+            pd.set(2, 0, base_link_t2);
             let tau_3 = tau.get(3, 0);
             let kept_21 = kept[21];
             let base_link_t3 = tau_3 + kept_21;
+            pd.set(3, 0, base_link_t3);
             let tau_4 = tau.get(4, 0);
             let kept_22 = kept[22];
             let base_link_t4 = tau_4 + kept_22;
+            pd.set(4, 0, base_link_t4);
             let tau_5 = tau.get(5, 0);
             let kept_23 = kept[23];
             let base_link_t5 = tau_5 + kept_23;
-            pd.set(0, 0, base_link_t0);
-            pd.set(1, 0, base_link_t1);
-            pd.set(2, 0, base_link_t2);
-            pd.set(3, 0, base_link_t3);
-            pd.set(4, 0, base_link_t4);
             pd.set(5, 0, base_link_t5);
         }
     }
@@ -3866,7 +4019,7 @@ impl Solo12 {
     /// Velocities from momenta.
     /// 1520 operations: 736 additions, 770 multiplications, 14 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn velocities(&self, q: &[f64; 19], p: &[f64; 18], v: &mut [f64; 18]) {
-        Self::velocities_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, v);
+        ::multibody::runtime::kernel::call_exact::<Self, 1, _>((q, p, v,));
     }
 
     #[inline(always)]
@@ -3906,46 +4059,80 @@ impl Solo12 {
             angles[11][l] = hr_lower_leg_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 12>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 18]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(4, l); }
-        for l in 0..LANES { given[5][l] = p.get(5, l); }
-        for l in 0..LANES { given[6][l] = p.get(6, l); }
-        for l in 0..LANES { given[7][l] = p.get(7, l); }
-        for l in 0..LANES { given[8][l] = p.get(8, l); }
-        for l in 0..LANES { given[9][l] = p.get(9, l); }
-        for l in 0..LANES { given[10][l] = p.get(10, l); }
-        for l in 0..LANES { given[11][l] = p.get(11, l); }
-        for l in 0..LANES { given[12][l] = p.get(12, l); }
-        for l in 0..LANES { given[13][l] = p.get(13, l); }
-        for l in 0..LANES { given[14][l] = p.get(14, l); }
-        for l in 0..LANES { given[15][l] = p.get(15, l); }
-        for l in 0..LANES { given[16][l] = p.get(16, l); }
-        for l in 0..LANES { given[17][l] = p.get(17, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 18]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(4, l); }
+        for l in 0..LANES { given_5[l] = p.get(5, l); }
+        for l in 0..LANES { given_6[l] = p.get(6, l); }
+        for l in 0..LANES { given_7[l] = p.get(7, l); }
+        for l in 0..LANES { given_8[l] = p.get(8, l); }
+        for l in 0..LANES { given_9[l] = p.get(9, l); }
+        for l in 0..LANES { given_10[l] = p.get(10, l); }
+        for l in 0..LANES { given_11[l] = p.get(11, l); }
+        for l in 0..LANES { given_12[l] = p.get(12, l); }
+        for l in 0..LANES { given_13[l] = p.get(13, l); }
+        for l in 0..LANES { given_14[l] = p.get(14, l); }
+        for l in 0..LANES { given_15[l] = p.get(15, l); }
+        for l in 0..LANES { given_16[l] = p.get(16, l); }
+        for l in 0..LANES { given_17[l] = p.get(17, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
         for l in 0..LANES {
             let (p_0, p_1, p_2, p_3, p_4, p_5, p_6, p_7, p_8, p_9, p_10, p_11, p_12, p_13, p_14, p_15, p_16, p_17, fl_shoulder_sin, fl_shoulder_cos, fr_shoulder_sin, fr_shoulder_cos, hl_shoulder_sin, hl_shoulder_cos, hr_shoulder_sin, hr_shoulder_cos, hr_lower_leg_t3, hr_lower_leg_t4, hr_lower_leg_t9, hr_lower_leg_t10, hr_lower_leg_t26, hr_upper_leg_t20, hr_upper_leg_t21, hr_upper_leg_t22, hr_upper_leg_t23, hr_upper_leg_t24, hr_upper_leg_minus_u_x, hr_upper_leg_u_y, hr_upper_leg_u_rx, hr_upper_leg_u_ry, hr_upper_leg_rho, hr_upper_leg_minus_k_x, hr_upper_leg_k_y, hr_upper_leg_k_rx, hr_upper_leg_k_ry, hr_upper_leg_minus_mp_ry_y, hr_shoulder_minus_u_x, hr_shoulder_u_y, hr_shoulder_u_rx, hr_shoulder_minus_u_ry, hr_shoulder_minus_rho, hr_shoulder_k_x, hr_shoulder_minus_k_y, hr_shoulder_k_z, hr_shoulder_minus_k_rx, hr_shoulder_k_ry, hl_lower_leg_t3, hl_lower_leg_t4, hl_lower_leg_t9, hl_lower_leg_t10, hl_lower_leg_t26, hl_upper_leg_t20, hl_upper_leg_t21, hl_upper_leg_t22, hl_upper_leg_t23, hl_upper_leg_t24, hl_upper_leg_minus_u_x, hl_upper_leg_u_y, hl_upper_leg_minus_u_rx, hl_upper_leg_minus_u_ry, hl_upper_leg_rho, hl_upper_leg_minus_k_x, hl_upper_leg_k_y, hl_upper_leg_minus_k_rx, hl_upper_leg_minus_k_ry, hl_upper_leg_mp_ry_y, hl_shoulder_u_x, hl_shoulder_minus_u_y, hl_shoulder_u_rx, hl_shoulder_minus_u_ry, hl_shoulder_minus_rho, hl_shoulder_minus_k_x, hl_shoulder_k_y, hl_shoulder_minus_k_z, hl_shoulder_minus_k_rx, hl_shoulder_k_ry, fr_lower_leg_t3, fr_lower_leg_t4, fr_lower_leg_t9, fr_lower_leg_t10, fr_lower_leg_t26, fr_upper_leg_t20, fr_upper_leg_t21, fr_upper_leg_t22, fr_upper_leg_t23, fr_upper_leg_t24, fr_upper_leg_minus_u_x, fr_upper_leg_u_y, fr_upper_leg_u_rx, fr_upper_leg_u_ry, fr_upper_leg_rho, fr_upper_leg_minus_k_x, fr_upper_leg_k_y, fr_upper_leg_k_rx, fr_upper_leg_k_ry, fr_upper_leg_minus_mp_ry_y, fr_shoulder_minus_u_x, fr_shoulder_u_y, fr_shoulder_u_rx, fr_shoulder_minus_u_ry, fr_shoulder_minus_rho, fr_shoulder_k_x, fr_shoulder_minus_k_y, fr_shoulder_k_z, fr_shoulder_minus_k_rx, fr_shoulder_k_ry, fr_shoulder_t94, fr_shoulder_t95, fr_shoulder_t96, fr_shoulder_t97, fr_shoulder_t98, fr_shoulder_t99, fr_shoulder_t100, fr_shoulder_t101, fr_shoulder_t102, fr_shoulder_t103, fr_shoulder_t104, fr_shoulder_t105, fr_shoulder_t106, fr_shoulder_t107, fr_shoulder_t108, fr_shoulder_t109, fr_shoulder_t110, fr_shoulder_t111, fr_shoulder_t112, fr_shoulder_t113, fr_shoulder_t114, fl_lower_leg_t3, fl_lower_leg_t4, fl_lower_leg_t9, fl_lower_leg_t10, fl_lower_leg_t26, fl_upper_leg_t20, fl_upper_leg_t21, fl_upper_leg_t22, fl_upper_leg_t23, fl_upper_leg_t24, fl_upper_leg_minus_u_x, fl_upper_leg_u_y, fl_upper_leg_minus_u_rx, fl_upper_leg_minus_u_ry, fl_upper_leg_rho, fl_upper_leg_minus_k_x, fl_upper_leg_k_y, fl_upper_leg_minus_k_rx, fl_upper_leg_minus_k_ry, fl_upper_leg_mp_ry_y, fl_shoulder_u_x, fl_shoulder_minus_u_y, fl_shoulder_u_rx, fl_shoulder_minus_u_ry, fl_shoulder_minus_rho, fl_shoulder_minus_k_x, fl_shoulder_k_y, fl_shoulder_minus_k_z, fl_shoulder_minus_k_rx, fl_shoulder_k_ry, fl_shoulder_minus_mp_xx, fl_shoulder_mp_xy, fl_shoulder_minus_mp_xz, fl_shoulder_minus_mp_rx_x, fl_shoulder_mp_yz, fl_shoulder_mp_rx_y, fl_shoulder_minus_mp_rx_z, fl_shoulder_mp_rx_rx, fl_shoulder_t67, fl_shoulder_t68, fl_shoulder_t69, fl_shoulder_t71, fl_shoulder_t72, fl_shoulder_t74, fl_shoulder_t75, fl_shoulder_t76, fl_shoulder_t77, fl_shoulder_t79, fl_shoulder_t80, fl_shoulder_t83) = {
-                let p_0 = given[0][l];
-                let p_1 = given[1][l];
-                let p_2 = given[2][l];
-                let p_3 = given[3][l];
-                let p_4 = given[4][l];
-                let p_5 = given[5][l];
-                let p_6 = given[6][l];
-                let p_7 = given[7][l];
-                let p_8 = given[8][l];
-                let p_9 = given[9][l];
-                let p_10 = given[10][l];
-                let p_11 = given[11][l];
-                let p_12 = given[12][l];
-                let p_13 = given[13][l];
-                let p_14 = given[14][l];
-                let p_15 = given[15][l];
-                let p_16 = given[16][l];
-                let p_17 = given[17][l];
+                let p_0 = given_0[l];
+                let p_1 = given_1[l];
+                let p_2 = given_2[l];
+                let p_3 = given_3[l];
+                let p_4 = given_4[l];
+                let p_5 = given_5[l];
+                let p_6 = given_6[l];
+                let p_7 = given_7[l];
+                let p_8 = given_8[l];
+                let p_9 = given_9[l];
+                let p_10 = given_10[l];
+                let p_11 = given_11[l];
+                let p_12 = given_12[l];
+                let p_13 = given_13[l];
+                let p_14 = given_14[l];
+                let p_15 = given_15[l];
+                let p_16 = given_16[l];
+                let p_17 = given_17[l];
                 // FL_SHOULDER: sine and cosine, rotation
                 let fl_shoulder_sin = sines[0][l];
                 let fl_shoulder_cos = cosines[0][l];
@@ -5547,34 +5734,34 @@ impl Solo12 {
                 let hr_lower_leg_v = hr_upper_leg_t53 - hr_upper_leg_t79;
                 (base_link_e_2, base_link_minus_v, base_link_v, base_link_minus_v_2, base_link_minus_v_3, base_link_minus_v_4, fl_shoulder_minus_v, fl_upper_leg_v, fl_lower_leg_v, fr_shoulder_minus_v, fr_upper_leg_v, fr_lower_leg_v, hl_shoulder_minus_v, hl_upper_leg_v, hl_lower_leg_v, hr_shoulder_minus_v, hr_upper_leg_v, hr_lower_leg_v)
             };
-            results[0][l] = -base_link_minus_v_4;
-            results[1][l] = -base_link_minus_v_3;
-            results[2][l] = -base_link_minus_v_2;
-            results[3][l] = base_link_v;
-            results[4][l] = -base_link_minus_v;
-            results[5][l] = base_link_e_2;
-            results[6][l] = -fl_shoulder_minus_v;
-            results[7][l] = fl_upper_leg_v;
-            results[8][l] = fl_lower_leg_v;
-            results[9][l] = -fr_shoulder_minus_v;
-            results[10][l] = fr_upper_leg_v;
-            results[11][l] = fr_lower_leg_v;
-            results[12][l] = -hl_shoulder_minus_v;
-            results[13][l] = hl_upper_leg_v;
-            results[14][l] = hl_lower_leg_v;
-            results[15][l] = -hr_shoulder_minus_v;
-            results[16][l] = hr_upper_leg_v;
-            results[17][l] = hr_lower_leg_v;
+            result_0[l] = -base_link_minus_v_4;
+            result_1[l] = -base_link_minus_v_3;
+            result_2[l] = -base_link_minus_v_2;
+            result_3[l] = base_link_v;
+            result_4[l] = -base_link_minus_v;
+            result_5[l] = base_link_e_2;
+            result_6[l] = -fl_shoulder_minus_v;
+            result_7[l] = fl_upper_leg_v;
+            result_8[l] = fl_lower_leg_v;
+            result_9[l] = -fr_shoulder_minus_v;
+            result_10[l] = fr_upper_leg_v;
+            result_11[l] = fr_lower_leg_v;
+            result_12[l] = -hl_shoulder_minus_v;
+            result_13[l] = hl_upper_leg_v;
+            result_14[l] = hl_lower_leg_v;
+            result_15[l] = -hr_shoulder_minus_v;
+            result_16[l] = hr_upper_leg_v;
+            result_17[l] = hr_lower_leg_v;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        v.give_pair(2, [&results[2], &results[3]]);
-        v.give_pair(4, [&results[4], &results[5]]);
-        v.give_pair(6, [&results[6], &results[7]]);
-        v.give_pair(8, [&results[8], &results[9]]);
-        v.give_pair(10, [&results[10], &results[11]]);
-        v.give_pair(12, [&results[12], &results[13]]);
-        v.give_pair(14, [&results[14], &results[15]]);
-        v.give_pair(16, [&results[16], &results[17]]);
+        v.give_pair(0, [&result_0, &result_1]);
+        v.give_pair(2, [&result_2, &result_3]);
+        v.give_pair(4, [&result_4, &result_5]);
+        v.give_pair(6, [&result_6, &result_7]);
+        v.give_pair(8, [&result_8, &result_9]);
+        v.give_pair(10, [&result_10, &result_11]);
+        v.give_pair(12, [&result_12, &result_13]);
+        v.give_pair(14, [&result_14, &result_15]);
+        v.give_pair(16, [&result_16, &result_17]);
     }
 
     /// One state: like branches at the same time, in the lanes of vector registers.
@@ -5598,7 +5785,50 @@ impl Solo12 {
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 3>(&angles);
         let mut kept = [0.0; 6];
-        let mut branches1 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 44]);
+        let mut branches1_0 = [0.0; LANES];
+        let mut branches1_1 = [0.0; LANES];
+        let mut branches1_2 = [0.0; LANES];
+        let mut branches1_3 = [0.0; LANES];
+        let mut branches1_4 = [0.0; LANES];
+        let mut branches1_5 = [0.0; LANES];
+        let mut branches1_6 = [0.0; LANES];
+        let mut branches1_7 = [0.0; LANES];
+        let mut branches1_8 = [0.0; LANES];
+        let mut branches1_9 = [0.0; LANES];
+        let mut branches1_10 = [0.0; LANES];
+        let mut branches1_11 = [0.0; LANES];
+        let mut branches1_12 = [0.0; LANES];
+        let mut branches1_13 = [0.0; LANES];
+        let mut branches1_14 = [0.0; LANES];
+        let mut branches1_15 = [0.0; LANES];
+        let mut branches1_16 = [0.0; LANES];
+        let mut branches1_17 = [0.0; LANES];
+        let mut branches1_18 = [0.0; LANES];
+        let mut branches1_19 = [0.0; LANES];
+        let mut branches1_20 = [0.0; LANES];
+        let mut branches1_21 = [0.0; LANES];
+        let mut branches1_22 = [0.0; LANES];
+        let mut branches1_23 = [0.0; LANES];
+        let mut branches1_24 = [0.0; LANES];
+        let mut branches1_25 = [0.0; LANES];
+        let mut branches1_26 = [0.0; LANES];
+        let mut branches1_27 = [0.0; LANES];
+        let mut branches1_28 = [0.0; LANES];
+        let mut branches1_29 = [0.0; LANES];
+        let mut branches1_30 = [0.0; LANES];
+        let mut branches1_31 = [0.0; LANES];
+        let mut branches1_32 = [0.0; LANES];
+        let mut branches1_33 = [0.0; LANES];
+        let mut branches1_34 = [0.0; LANES];
+        let mut branches1_35 = [0.0; LANES];
+        let mut branches1_36 = [0.0; LANES];
+        let mut branches1_37 = [0.0; LANES];
+        let mut branches1_38 = [0.0; LANES];
+        let mut branches1_39 = [0.0; LANES];
+        let mut branches1_40 = [0.0; LANES];
+        let mut branches1_41 = [0.0; LANES];
+        let mut branches1_42 = [0.0; LANES];
+        let mut branches1_43 = [0.0; LANES];
         {
             let given9 = [p.get(8, 0), p.get(11, 0), p.get(14, 0), p.get(17, 0)];
             let given10 = [p.get(7, 0), p.get(10, 0), p.get(13, 0), p.get(16, 0)];
@@ -5668,10 +5898,15 @@ impl Solo12 {
                 let fl_lower_leg_t24 = fl_lower_leg_t0 * fl_lower_leg_t3;
                 let fl_lower_leg_t25 = fl_lower_leg_t23 + fl_lower_leg_t24;
                 let fl_upper_leg_t20 = 1842.9129686423128 * fl_lower_leg_t2;
+                branches1_0[k] = fl_upper_leg_t20;
                 let fl_upper_leg_t21 = 1842.9129686423128 * fl_lower_leg_t3;
+                branches1_1[k] = fl_upper_leg_t21;
                 let fl_upper_leg_t22 = 1842.9129686423128 * fl_lower_leg_t8;
+                branches1_2[k] = fl_upper_leg_t22;
                 let fl_upper_leg_t23 = 1842.9129686423128 * fl_lower_leg_t9;
+                branches1_3[k] = fl_upper_leg_t23;
                 let fl_upper_leg_t24 = 1842.9129686423128 * fl_lower_leg_t25;
+                branches1_4[k] = fl_upper_leg_t24;
                 let fl_upper_leg_t25 = fl_lower_leg_t2 * fl_upper_leg_t20;
                 let fl_upper_leg_t26 = fl_lower_leg_t2 * fl_upper_leg_t21;
                 let fl_upper_leg_t27 = fl_lower_leg_t2 * fl_upper_leg_t22;
@@ -5697,9 +5932,13 @@ impl Solo12 {
                 let fl_upper_leg_u_rz = fl_upper_leg_m_rz_rz - fl_upper_leg_t42;
                 let fl_upper_leg_rho = 1.0 / fl_upper_leg_u_rz;
                 let fl_upper_leg_minus_k_x = fl_upper_leg_minus_u_x * fl_upper_leg_rho;
+                branches1_5[k] = fl_upper_leg_minus_k_x;
                 let fl_upper_leg_k_y = fl_upper_leg_u_y * fl_upper_leg_rho;
+                branches1_6[k] = fl_upper_leg_k_y;
                 let fl_upper_leg_k_rx = fl_upper_leg_u_rx * fl_upper_leg_rho;
+                branches1_7[k] = fl_upper_leg_k_rx;
                 let fl_upper_leg_k_ry = fl_upper_leg_u_ry * fl_upper_leg_rho;
+                branches1_8[k] = fl_upper_leg_k_ry;
                 let fl_upper_leg_t43 = fl_upper_leg_minus_u_x * fl_upper_leg_minus_k_x;
                 let fl_upper_leg_minus_mp_xx = fl_upper_leg_t25 + fl_upper_leg_t43;
                 let fl_upper_leg_t44 = fl_upper_leg_minus_u_x * fl_upper_leg_k_y;
@@ -5727,6 +5966,7 @@ impl Solo12 {
                 let fl_shoulder_minus_m_rz_rz = fl_upper_leg_minus_mp_ry_ry - 0.003179970268177617;
                 let p_8 = given9[k];
                 let fl_upper_leg_t53 = 1842.9129686423128 * p_8;
+                branches1_9[k] = fl_upper_leg_t53;
                 let fl_upper_leg_t54 = fl_lower_leg_t2 * fl_upper_leg_t53;
                 let fl_upper_leg_t55 = fl_lower_leg_t3 * fl_upper_leg_t53;
                 let fl_upper_leg_t56 = fl_lower_leg_t8 * fl_upper_leg_t53;
@@ -5735,6 +5975,7 @@ impl Solo12 {
                 let p_7 = given10[k];
                 let fl_upper_leg_t59 = p_7 - fl_upper_leg_t58;
                 let fl_upper_leg_e = fl_upper_leg_rho * fl_upper_leg_t59;
+                branches1_10[k] = fl_upper_leg_e;
                 let fl_upper_leg_t60 = fl_upper_leg_minus_u_x * fl_upper_leg_e;
                 let fl_upper_leg_minus_dp_x = fl_upper_leg_t54 + fl_upper_leg_t60;
                 let fl_upper_leg_t61 = fl_upper_leg_u_y * fl_upper_leg_e;
@@ -5804,16 +6045,23 @@ impl Solo12 {
                 let fl_shoulder_t50 = fl_shoulder_t21 - fl_shoulder_t49;
                 let fl_shoulder_minus_rho = 1.0 / fl_shoulder_minus_m_rz_rz;
                 let fl_shoulder_k_x = fl_shoulder_minus_u_x * fl_shoulder_minus_rho;
+                branches1_11[k] = fl_shoulder_k_x;
                 let fl_shoulder_minus_k_y = fl_shoulder_u_y * fl_shoulder_minus_rho;
+                branches1_12[k] = fl_shoulder_minus_k_y;
                 let fl_shoulder_k_z = fl_upper_leg_minus_mp_ry_y * fl_shoulder_minus_rho;
+                branches1_13[k] = fl_shoulder_k_z;
                 let fl_shoulder_minus_k_rx = fl_shoulder_u_rx * fl_shoulder_minus_rho;
+                branches1_14[k] = fl_shoulder_minus_k_rx;
                 let fl_shoulder_k_ry = fl_shoulder_minus_u_ry * fl_shoulder_minus_rho;
+                branches1_15[k] = fl_shoulder_k_ry;
                 let fl_shoulder_t51 = fl_shoulder_minus_u_x * fl_shoulder_k_x;
                 let fl_shoulder_minus_mp_xx = fl_shoulder_t3 - fl_shoulder_t51;
                 let fl_shoulder_t52 = fl_shoulder_minus_u_x * fl_shoulder_minus_k_y;
                 let fl_shoulder_mp_xy = fl_shoulder_t2 - fl_shoulder_t52;
+                branches1_16[k] = fl_shoulder_mp_xy;
                 let fl_shoulder_t53 = fl_shoulder_minus_u_x * fl_shoulder_k_z;
                 let fl_shoulder_minus_mp_xz = fl_shoulder_t4 - fl_shoulder_t53;
+                branches1_17[k] = fl_shoulder_minus_mp_xz;
                 let fl_shoulder_t54 = fl_shoulder_minus_u_x * fl_shoulder_minus_k_rx;
                 let fl_shoulder_mp_rx_x = fl_shoulder_t30 - fl_shoulder_t54;
                 let fl_shoulder_t55 = fl_shoulder_minus_u_x * fl_shoulder_k_ry;
@@ -5822,14 +6070,17 @@ impl Solo12 {
                 let fl_shoulder_minus_mp_yy = fl_shoulder_t1 - fl_shoulder_t56;
                 let fl_shoulder_t57 = fl_shoulder_u_y * fl_shoulder_k_z;
                 let fl_shoulder_mp_yz = fl_shoulder_t5 - fl_shoulder_t57;
+                branches1_18[k] = fl_shoulder_mp_yz;
                 let fl_shoulder_t58 = fl_shoulder_u_y * fl_shoulder_minus_k_rx;
                 let fl_shoulder_minus_mp_rx_y = fl_shoulder_t34 - fl_shoulder_t58;
+                branches1_19[k] = fl_shoulder_minus_mp_rx_y;
                 let fl_shoulder_t59 = fl_shoulder_u_y * fl_shoulder_k_ry;
                 let fl_shoulder_mp_ry_y = fl_shoulder_t35 - fl_shoulder_t59;
                 let fl_shoulder_t60 = fl_upper_leg_minus_mp_ry_y * fl_shoulder_k_z;
                 let fl_shoulder_minus_mp_zz = fl_upper_leg_minus_mp_yy - fl_shoulder_t60;
                 let fl_shoulder_t61 = fl_upper_leg_minus_mp_ry_y * fl_shoulder_minus_k_rx;
                 let fl_shoulder_mp_rx_z = fl_shoulder_t37 - fl_shoulder_t61;
+                branches1_20[k] = fl_shoulder_mp_rx_z;
                 let fl_shoulder_t62 = fl_upper_leg_minus_mp_ry_y * fl_shoulder_k_ry;
                 let fl_shoulder_minus_mp_ry_z = fl_shoulder_t39 - fl_shoulder_t62;
                 let fl_shoulder_t63 = fl_shoulder_u_rx * fl_shoulder_minus_k_rx;
@@ -5841,32 +6092,48 @@ impl Solo12 {
                 let fl_shoulder_t66 = fl_shoulder_minus_mp_yy - fl_shoulder_minus_mp_zz;
                 let fl_shoulder_t67 = fl_shoulder_minus_mp_yy - fl_shoulder_t66;
                 let fl_shoulder_t68 = fl_shoulder_minus_mp_zz + fl_shoulder_t66;
+                branches1_21[k] = fl_shoulder_t68;
                 let table_0 = table[0][k];
                 let fl_shoulder_t69 = table_0 * fl_shoulder_mp_xy;
+                branches1_22[k] = fl_shoulder_t69;
                 let fl_shoulder_t70 = table_0 * fl_shoulder_minus_mp_xz;
                 let fl_shoulder_t71 = fl_shoulder_minus_mp_ry_x - fl_shoulder_t70;
+                branches1_23[k] = fl_shoulder_t71;
                 let fl_shoulder_t72 = table_0 * fl_shoulder_mp_yz;
                 let fl_shoulder_t73 = table_0 * fl_shoulder_t67;
                 let fl_shoulder_t74 = fl_shoulder_minus_mp_ry_z - fl_shoulder_t73;
+                branches1_24[k] = fl_shoulder_t74;
                 let fl_shoulder_t75 = table_0 * fl_shoulder_t68;
+                branches1_25[k] = fl_shoulder_t75;
                 let fl_shoulder_t76 = fl_shoulder_mp_ry_y - fl_shoulder_t72;
+                branches1_26[k] = fl_shoulder_t76;
                 let fl_shoulder_t77 = table_0 * fl_shoulder_minus_mp_rx_y;
+                branches1_27[k] = fl_shoulder_t77;
                 let fl_shoulder_t78 = table_0 * fl_shoulder_mp_rx_z;
                 let fl_shoulder_t79 = fl_shoulder_minus_mp_rx_ry + fl_shoulder_t78;
+                branches1_28[k] = fl_shoulder_t79;
                 let fl_shoulder_t80 = table_0 * fl_shoulder_t75;
                 let fl_shoulder_t81 = fl_shoulder_minus_mp_ry_z + fl_shoulder_t74;
                 let fl_shoulder_t82 = table_0 * fl_shoulder_t81;
                 let fl_shoulder_t83 = fl_shoulder_mp_ry_ry + fl_shoulder_t82;
+                branches1_29[k] = fl_shoulder_t83;
                 let fl_shoulder_t84 = table_0 * fl_shoulder_t76;
+                branches1_30[k] = fl_shoulder_t84;
                 let fl_shoulder_t85 = fl_shoulder_minus_mp_xx - fl_shoulder_t67;
                 let fl_shoulder_t86 = fl_shoulder_minus_mp_xx - fl_shoulder_t85;
+                branches1_31[k] = fl_shoulder_t86;
                 let fl_shoulder_t87 = fl_shoulder_t67 + fl_shoulder_t85;
+                branches1_32[k] = fl_shoulder_t87;
                 let fl_shoulder_t88 = fl_shoulder_mp_rx_x - fl_shoulder_t72;
                 let fl_shoulder_t89 = fl_shoulder_mp_rx_x - fl_shoulder_t88;
+                branches1_33[k] = fl_shoulder_t89;
                 let fl_shoulder_t90 = fl_shoulder_t72 + fl_shoulder_t88;
+                branches1_34[k] = fl_shoulder_t90;
                 let fl_shoulder_t91 = fl_shoulder_mp_rx_rx + fl_shoulder_t80;
                 let fl_shoulder_t92 = fl_shoulder_mp_rx_rx - fl_shoulder_t91;
+                branches1_35[k] = fl_shoulder_t92;
                 let fl_shoulder_t93 = fl_shoulder_t80 - fl_shoulder_t91;
+                branches1_36[k] = fl_shoulder_t93;
                 let fl_shoulder_t94 = row_0 * fl_upper_leg_minus_dp_x;
                 let fl_shoulder_t95 = row_1 * fl_upper_leg_minus_dp_x;
                 let fl_shoulder_t96 = row_0 * fl_upper_leg_dp_rx;
@@ -5882,262 +6149,225 @@ impl Solo12 {
                 let p_6 = given16[k];
                 let fl_shoulder_t106 = p_6 + fl_upper_leg_dp_ry;
                 let fl_shoulder_minus_e = fl_shoulder_minus_rho * fl_shoulder_t106;
+                branches1_37[k] = fl_shoulder_minus_e;
                 let fl_shoulder_t107 = fl_shoulder_minus_u_x * fl_shoulder_minus_e;
                 let fl_shoulder_minus_dp_x = fl_shoulder_t94 - fl_shoulder_t107;
+                branches1_38[k] = fl_shoulder_minus_dp_x;
                 let fl_shoulder_t108 = fl_shoulder_u_y * fl_shoulder_minus_e;
                 let fl_shoulder_dp_y = fl_shoulder_t95 - fl_shoulder_t108;
+                branches1_39[k] = fl_shoulder_dp_y;
                 let fl_shoulder_t109 = fl_upper_leg_minus_mp_ry_y * fl_shoulder_minus_e;
                 let fl_shoulder_minus_dp_z = fl_upper_leg_dp_y - fl_shoulder_t109;
+                branches1_40[k] = fl_shoulder_minus_dp_z;
                 let fl_shoulder_t110 = fl_shoulder_u_rx * fl_shoulder_minus_e;
                 let fl_shoulder_dp_rx = fl_shoulder_t103 - fl_shoulder_t110;
+                branches1_41[k] = fl_shoulder_dp_rx;
                 let fl_shoulder_t111 = fl_shoulder_minus_u_ry * fl_shoulder_minus_e;
                 let fl_shoulder_minus_dp_ry = fl_shoulder_t105 - fl_shoulder_t111;
                 let fl_shoulder_t112 = table_0 * fl_shoulder_dp_y;
                 let fl_shoulder_t113 = p_6 + fl_shoulder_t112;
+                branches1_42[k] = fl_shoulder_t113;
                 let fl_shoulder_t114 = table_0 * fl_shoulder_minus_dp_z;
                 let fl_shoulder_t115 = fl_shoulder_minus_dp_ry - fl_shoulder_t114;
-                branches1[0][k] = fl_upper_leg_t20;
-                branches1[1][k] = fl_upper_leg_t21;
-                branches1[2][k] = fl_upper_leg_t22;
-                branches1[3][k] = fl_upper_leg_t23;
-                branches1[4][k] = fl_upper_leg_t24;
-                branches1[5][k] = fl_upper_leg_minus_k_x;
-                branches1[6][k] = fl_upper_leg_k_y;
-                branches1[7][k] = fl_upper_leg_k_rx;
-                branches1[8][k] = fl_upper_leg_k_ry;
-                branches1[9][k] = fl_upper_leg_t53;
-                branches1[10][k] = fl_upper_leg_e;
-                branches1[11][k] = fl_shoulder_k_x;
-                branches1[12][k] = fl_shoulder_minus_k_y;
-                branches1[13][k] = fl_shoulder_k_z;
-                branches1[14][k] = fl_shoulder_minus_k_rx;
-                branches1[15][k] = fl_shoulder_k_ry;
-                branches1[16][k] = fl_shoulder_mp_xy;
-                branches1[17][k] = fl_shoulder_minus_mp_xz;
-                branches1[18][k] = fl_shoulder_mp_yz;
-                branches1[19][k] = fl_shoulder_minus_mp_rx_y;
-                branches1[20][k] = fl_shoulder_mp_rx_z;
-                branches1[21][k] = fl_shoulder_t68;
-                branches1[22][k] = fl_shoulder_t69;
-                branches1[23][k] = fl_shoulder_t71;
-                branches1[24][k] = fl_shoulder_t74;
-                branches1[25][k] = fl_shoulder_t75;
-                branches1[26][k] = fl_shoulder_t76;
-                branches1[27][k] = fl_shoulder_t77;
-                branches1[28][k] = fl_shoulder_t79;
-                branches1[29][k] = fl_shoulder_t83;
-                branches1[30][k] = fl_shoulder_t84;
-                branches1[31][k] = fl_shoulder_t86;
-                branches1[32][k] = fl_shoulder_t87;
-                branches1[33][k] = fl_shoulder_t89;
-                branches1[34][k] = fl_shoulder_t90;
-                branches1[35][k] = fl_shoulder_t92;
-                branches1[36][k] = fl_shoulder_t93;
-                branches1[37][k] = fl_shoulder_minus_e;
-                branches1[38][k] = fl_shoulder_minus_dp_x;
-                branches1[39][k] = fl_shoulder_dp_y;
-                branches1[40][k] = fl_shoulder_minus_dp_z;
-                branches1[41][k] = fl_shoulder_dp_rx;
-                branches1[42][k] = fl_shoulder_t113;
-                branches1[43][k] = fl_shoulder_t115;
+                branches1_43[k] = fl_shoulder_t115;
             }
         }
         {
-            let branch3_row_37 = branches1[31][3];
+            let branch3_row_37 = branches1_31[3];
             // HR_LOWER_LEG: sine and cosine, rotation
             let hr_lower_leg_t0 = branch3_row_37 - 2.50000279;
-            let branch3_row_38 = branches1[32][3];
+            let branch3_row_38 = branches1_32[3];
             let hr_lower_leg_t1 = branch3_row_38 - 2.50000279;
-            let branch3_row_27 = branches1[21][3];
+            let branch3_row_27 = branches1_21[3];
             let hr_lower_leg_t2 = branch3_row_27 - 2.50000279;
-            let branch3_row_41 = branches1[35][3];
+            let branch3_row_41 = branches1_35[3];
             let hr_lower_leg_t3 = branch3_row_41 + 0.016036324706249997;
-            let branch3_row_42 = branches1[36][3];
+            let branch3_row_42 = branches1_36[3];
             let hr_lower_leg_t4 = branch3_row_42 - 0.05721008180454845;
-            let branch3_row_35 = branches1[29][3];
+            let branch3_row_35 = branches1_29[3];
             let hr_lower_leg_t5 = branch3_row_35 + 0.07284082651079846;
-            let branch2_row_37 = branches1[31][2];
+            let branch2_row_37 = branches1_31[2];
             let hr_lower_leg_t6 = branch2_row_37 + hr_lower_leg_t0;
-            let branch2_row_23 = branches1[17][2];
-            let branch3_row_23 = branches1[17][3];
+            let branch2_row_23 = branches1_17[2];
+            let branch3_row_23 = branches1_17[3];
             let hr_lower_leg_t7 = branch2_row_23 + branch3_row_23;
-            let branch2_row_24 = branches1[18][2];
-            let branch3_row_24 = branches1[18][3];
+            let branch2_row_24 = branches1_18[2];
+            let branch3_row_24 = branches1_18[3];
             let hr_lower_leg_t8 = branch2_row_24 + branch3_row_24;
-            let branch2_row_38 = branches1[32][2];
+            let branch2_row_38 = branches1_32[2];
             let hr_lower_leg_t9 = branch2_row_38 + hr_lower_leg_t1;
-            let branch2_row_22 = branches1[16][2];
-            let branch3_row_22 = branches1[16][3];
+            let branch2_row_22 = branches1_16[2];
+            let branch3_row_22 = branches1_16[3];
             let hr_lower_leg_t10 = branch2_row_22 + branch3_row_22;
-            let branch2_row_27 = branches1[21][2];
+            let branch2_row_27 = branches1_21[2];
             let hr_lower_leg_t11 = branch2_row_27 + hr_lower_leg_t2;
-            let branch2_row_39 = branches1[33][2];
-            let branch3_row_39 = branches1[33][3];
+            let branch2_row_39 = branches1_33[2];
+            let branch3_row_39 = branches1_33[3];
             let hr_lower_leg_t12 = branch2_row_39 + branch3_row_39;
-            let branch2_row_28 = branches1[22][2];
-            let branch3_row_28 = branches1[22][3];
+            let branch2_row_28 = branches1_22[2];
+            let branch3_row_28 = branches1_22[3];
             let hr_lower_leg_t13 = branch2_row_28 + branch3_row_28;
-            let branch2_row_31 = branches1[25][2];
-            let branch3_row_31 = branches1[25][3];
+            let branch2_row_31 = branches1_25[2];
+            let branch3_row_31 = branches1_25[3];
             let hr_lower_leg_t14 = branch2_row_31 + branch3_row_31;
-            let branch2_row_26 = branches1[20][2];
-            let branch3_row_26 = branches1[20][3];
+            let branch2_row_26 = branches1_20[2];
+            let branch3_row_26 = branches1_20[3];
             let hr_lower_leg_t15 = branch2_row_26 + branch3_row_26;
-            let branch2_row_40 = branches1[34][2];
-            let branch3_row_40 = branches1[34][3];
+            let branch2_row_40 = branches1_34[2];
+            let branch3_row_40 = branches1_34[3];
             let hr_lower_leg_t16 = branch2_row_40 + branch3_row_40;
-            let branch2_row_25 = branches1[19][2];
-            let branch3_row_25 = branches1[19][3];
+            let branch2_row_25 = branches1_19[2];
+            let branch3_row_25 = branches1_19[3];
             let hr_lower_leg_t17 = branch2_row_25 + branch3_row_25;
-            let branch2_row_30 = branches1[24][2];
-            let branch3_row_30 = branches1[24][3];
+            let branch2_row_30 = branches1_24[2];
+            let branch3_row_30 = branches1_24[3];
             let hr_lower_leg_t18 = branch2_row_30 + branch3_row_30;
-            let branch2_row_29 = branches1[23][2];
-            let branch3_row_29 = branches1[23][3];
+            let branch2_row_29 = branches1_23[2];
+            let branch3_row_29 = branches1_23[3];
             let hr_lower_leg_t19 = branch2_row_29 + branch3_row_29;
-            let branch2_row_32 = branches1[26][2];
-            let branch3_row_32 = branches1[26][3];
+            let branch2_row_32 = branches1_26[2];
+            let branch3_row_32 = branches1_26[3];
             let hr_lower_leg_t20 = branch2_row_32 + branch3_row_32;
-            let branch2_row_41 = branches1[35][2];
+            let branch2_row_41 = branches1_35[2];
             let hr_lower_leg_t21 = branch2_row_41 + hr_lower_leg_t3;
-            let branch2_row_33 = branches1[27][2];
-            let branch3_row_33 = branches1[27][3];
+            let branch2_row_33 = branches1_27[2];
+            let branch3_row_33 = branches1_27[3];
             let hr_lower_leg_t22 = branch2_row_33 + branch3_row_33;
-            let branch2_row_36 = branches1[30][2];
-            let branch3_row_36 = branches1[30][3];
+            let branch2_row_36 = branches1_30[2];
+            let branch3_row_36 = branches1_30[3];
             let hr_lower_leg_t23 = branch2_row_36 + branch3_row_36;
-            let branch2_row_42 = branches1[36][2];
+            let branch2_row_42 = branches1_36[2];
             let hr_lower_leg_t24 = branch2_row_42 + hr_lower_leg_t4;
-            let branch2_row_34 = branches1[28][2];
-            let branch3_row_34 = branches1[28][3];
+            let branch2_row_34 = branches1_28[2];
+            let branch3_row_34 = branches1_28[3];
             let hr_lower_leg_t25 = branch2_row_34 + branch3_row_34;
-            let branch2_row_35 = branches1[29][2];
+            let branch2_row_35 = branches1_29[2];
             let hr_lower_leg_t26 = branch2_row_35 + hr_lower_leg_t5;
-            let branch2_row_46 = branches1[40][2];
-            let branch3_row_46 = branches1[40][3];
+            let branch2_row_46 = branches1_40[2];
+            let branch3_row_46 = branches1_40[3];
             let hr_lower_leg_t27 = branch2_row_46 + branch3_row_46;
-            let branch2_row_44 = branches1[38][2];
-            let branch3_row_44 = branches1[38][3];
+            let branch2_row_44 = branches1_38[2];
+            let branch3_row_44 = branches1_38[3];
             let hr_lower_leg_t28 = branch2_row_44 + branch3_row_44;
-            let branch2_row_45 = branches1[39][2];
-            let branch3_row_45 = branches1[39][3];
+            let branch2_row_45 = branches1_39[2];
+            let branch3_row_45 = branches1_39[3];
             let hr_lower_leg_t29 = branch2_row_45 + branch3_row_45;
-            let branch2_row_48 = branches1[42][2];
-            let branch3_row_48 = branches1[42][3];
+            let branch2_row_48 = branches1_42[2];
+            let branch3_row_48 = branches1_42[3];
             let hr_lower_leg_t30 = branch2_row_48 + branch3_row_48;
-            let branch2_row_47 = branches1[41][2];
-            let branch3_row_47 = branches1[41][3];
+            let branch2_row_47 = branches1_41[2];
+            let branch3_row_47 = branches1_41[3];
             let hr_lower_leg_t31 = branch2_row_47 + branch3_row_47;
-            let branch2_row_49 = branches1[43][2];
-            let branch3_row_49 = branches1[43][3];
+            let branch2_row_49 = branches1_43[2];
+            let branch3_row_49 = branches1_43[3];
             let hr_lower_leg_t32 = branch2_row_49 + branch3_row_49;
-            let branch1_row_37 = branches1[31][1];
+            let branch1_row_37 = branches1_31[1];
             let hr_lower_leg_t33 = branch1_row_37 + hr_lower_leg_t6;
-            let branch1_row_23 = branches1[17][1];
+            let branch1_row_23 = branches1_17[1];
             let hr_lower_leg_t34 = branch1_row_23 + hr_lower_leg_t7;
-            let branch1_row_24 = branches1[18][1];
+            let branch1_row_24 = branches1_18[1];
             let hr_lower_leg_t35 = branch1_row_24 + hr_lower_leg_t8;
-            let branch1_row_38 = branches1[32][1];
+            let branch1_row_38 = branches1_32[1];
             let hr_lower_leg_t36 = branch1_row_38 + hr_lower_leg_t9;
-            let branch1_row_22 = branches1[16][1];
+            let branch1_row_22 = branches1_16[1];
             let hr_lower_leg_t37 = branch1_row_22 + hr_lower_leg_t10;
-            let branch1_row_27 = branches1[21][1];
+            let branch1_row_27 = branches1_21[1];
             let hr_lower_leg_t38 = branch1_row_27 + hr_lower_leg_t11;
-            let branch1_row_39 = branches1[33][1];
+            let branch1_row_39 = branches1_33[1];
             let hr_lower_leg_t39 = branch1_row_39 + hr_lower_leg_t12;
-            let branch1_row_28 = branches1[22][1];
+            let branch1_row_28 = branches1_22[1];
             let hr_lower_leg_t40 = branch1_row_28 + hr_lower_leg_t13;
-            let branch1_row_31 = branches1[25][1];
+            let branch1_row_31 = branches1_25[1];
             let hr_lower_leg_t41 = branch1_row_31 + hr_lower_leg_t14;
-            let branch1_row_26 = branches1[20][1];
+            let branch1_row_26 = branches1_20[1];
             let hr_lower_leg_t42 = branch1_row_26 + hr_lower_leg_t15;
-            let branch1_row_40 = branches1[34][1];
+            let branch1_row_40 = branches1_34[1];
             let hr_lower_leg_t43 = branch1_row_40 + hr_lower_leg_t16;
-            let branch1_row_25 = branches1[19][1];
+            let branch1_row_25 = branches1_19[1];
             let hr_lower_leg_t44 = branch1_row_25 + hr_lower_leg_t17;
-            let branch1_row_30 = branches1[24][1];
+            let branch1_row_30 = branches1_24[1];
             let hr_lower_leg_t45 = branch1_row_30 + hr_lower_leg_t18;
-            let branch1_row_29 = branches1[23][1];
+            let branch1_row_29 = branches1_23[1];
             let hr_lower_leg_t46 = branch1_row_29 + hr_lower_leg_t19;
-            let branch1_row_32 = branches1[26][1];
+            let branch1_row_32 = branches1_26[1];
             let hr_lower_leg_t47 = branch1_row_32 + hr_lower_leg_t20;
-            let branch1_row_41 = branches1[35][1];
+            let branch1_row_41 = branches1_35[1];
             let hr_lower_leg_t48 = branch1_row_41 + hr_lower_leg_t21;
-            let branch1_row_33 = branches1[27][1];
+            let branch1_row_33 = branches1_27[1];
             let hr_lower_leg_t49 = branch1_row_33 + hr_lower_leg_t22;
-            let branch1_row_36 = branches1[30][1];
+            let branch1_row_36 = branches1_30[1];
             let hr_lower_leg_t50 = branch1_row_36 + hr_lower_leg_t23;
-            let branch1_row_42 = branches1[36][1];
+            let branch1_row_42 = branches1_36[1];
             let hr_lower_leg_t51 = branch1_row_42 + hr_lower_leg_t24;
-            let branch1_row_34 = branches1[28][1];
+            let branch1_row_34 = branches1_28[1];
             let hr_lower_leg_t52 = branch1_row_34 + hr_lower_leg_t25;
-            let branch1_row_35 = branches1[29][1];
+            let branch1_row_35 = branches1_29[1];
             let hr_lower_leg_t53 = branch1_row_35 + hr_lower_leg_t26;
-            let branch1_row_46 = branches1[40][1];
+            let branch1_row_46 = branches1_40[1];
             let hr_lower_leg_t54 = branch1_row_46 + hr_lower_leg_t27;
-            let branch1_row_44 = branches1[38][1];
+            let branch1_row_44 = branches1_38[1];
             let hr_lower_leg_t55 = branch1_row_44 + hr_lower_leg_t28;
-            let branch1_row_45 = branches1[39][1];
+            let branch1_row_45 = branches1_39[1];
             let hr_lower_leg_t56 = branch1_row_45 + hr_lower_leg_t29;
-            let branch1_row_48 = branches1[42][1];
+            let branch1_row_48 = branches1_42[1];
             let hr_lower_leg_t57 = branch1_row_48 + hr_lower_leg_t30;
-            let branch1_row_47 = branches1[41][1];
+            let branch1_row_47 = branches1_41[1];
             let hr_lower_leg_t58 = branch1_row_47 + hr_lower_leg_t31;
-            let branch1_row_49 = branches1[43][1];
+            let branch1_row_49 = branches1_43[1];
             let hr_lower_leg_t59 = branch1_row_49 + hr_lower_leg_t32;
-            let branch0_row_37 = branches1[31][0];
+            let branch0_row_37 = branches1_31[0];
             let base_link_minus_m_xx = branch0_row_37 + hr_lower_leg_t33;
-            let branch0_row_23 = branches1[17][0];
+            let branch0_row_23 = branches1_17[0];
             let base_link_minus_m_xy = branch0_row_23 + hr_lower_leg_t34;
-            let branch0_row_24 = branches1[18][0];
+            let branch0_row_24 = branches1_18[0];
             let base_link_m_xz = branch0_row_24 + hr_lower_leg_t35;
-            let branch0_row_38 = branches1[32][0];
+            let branch0_row_38 = branches1_32[0];
             let base_link_minus_m_yy = branch0_row_38 + hr_lower_leg_t36;
-            let branch0_row_22 = branches1[16][0];
+            let branch0_row_22 = branches1_16[0];
             let base_link_m_yz = branch0_row_22 + hr_lower_leg_t37;
-            let branch0_row_27 = branches1[21][0];
+            let branch0_row_27 = branches1_21[0];
             let base_link_minus_m_zz = branch0_row_27 + hr_lower_leg_t38;
-            let branch0_row_39 = branches1[33][0];
+            let branch0_row_39 = branches1_33[0];
             let base_link_m_rx_x = branch0_row_39 + hr_lower_leg_t39;
-            let branch0_row_28 = branches1[22][0];
+            let branch0_row_28 = branches1_22[0];
             let base_link_m_rx_y = branch0_row_28 + hr_lower_leg_t40;
-            let branch0_row_31 = branches1[25][0];
+            let branch0_row_31 = branches1_25[0];
             let base_link_minus_m_rx_z = branch0_row_31 + hr_lower_leg_t41;
-            let branch0_row_26 = branches1[20][0];
+            let branch0_row_26 = branches1_20[0];
             let base_link_m_ry_x = branch0_row_26 + hr_lower_leg_t42;
-            let branch0_row_40 = branches1[34][0];
+            let branch0_row_40 = branches1_34[0];
             let base_link_m_ry_y = branch0_row_40 + hr_lower_leg_t43;
-            let branch0_row_25 = branches1[19][0];
+            let branch0_row_25 = branches1_19[0];
             let base_link_minus_m_ry_z = branch0_row_25 + hr_lower_leg_t44;
-            let branch0_row_30 = branches1[24][0];
+            let branch0_row_30 = branches1_24[0];
             let base_link_minus_m_rz_x = branch0_row_30 + hr_lower_leg_t45;
-            let branch0_row_29 = branches1[23][0];
+            let branch0_row_29 = branches1_23[0];
             let base_link_minus_m_rz_y = branch0_row_29 + hr_lower_leg_t46;
-            let branch0_row_32 = branches1[26][0];
+            let branch0_row_32 = branches1_26[0];
             let base_link_m_rz_z = branch0_row_32 + hr_lower_leg_t47;
-            let branch0_row_41 = branches1[35][0];
+            let branch0_row_41 = branches1_35[0];
             let base_link_m_rx_rx = branch0_row_41 + hr_lower_leg_t48;
-            let branch0_row_33 = branches1[27][0];
+            let branch0_row_33 = branches1_27[0];
             let base_link_minus_m_rx_ry = branch0_row_33 + hr_lower_leg_t49;
-            let branch0_row_36 = branches1[30][0];
+            let branch0_row_36 = branches1_30[0];
             let base_link_m_rx_rz = branch0_row_36 + hr_lower_leg_t50;
-            let branch0_row_42 = branches1[36][0];
+            let branch0_row_42 = branches1_36[0];
             let base_link_minus_m_ry_ry = branch0_row_42 + hr_lower_leg_t51;
-            let branch0_row_34 = branches1[28][0];
+            let branch0_row_34 = branches1_28[0];
             let base_link_minus_m_ry_rz = branch0_row_34 + hr_lower_leg_t52;
-            let branch0_row_35 = branches1[29][0];
+            let branch0_row_35 = branches1_29[0];
             let base_link_m_rz_rz = branch0_row_35 + hr_lower_leg_t53;
-            let branch0_row_46 = branches1[40][0];
+            let branch0_row_46 = branches1_40[0];
             let base_link_minus_d_x = branch0_row_46 + hr_lower_leg_t54;
-            let branch0_row_44 = branches1[38][0];
+            let branch0_row_44 = branches1_38[0];
             let base_link_minus_d_y = branch0_row_44 + hr_lower_leg_t55;
-            let branch0_row_45 = branches1[39][0];
+            let branch0_row_45 = branches1_39[0];
             let base_link_d_z = branch0_row_45 + hr_lower_leg_t56;
-            let branch0_row_48 = branches1[42][0];
+            let branch0_row_48 = branches1_42[0];
             let base_link_d_rx = branch0_row_48 + hr_lower_leg_t57;
-            let branch0_row_47 = branches1[41][0];
+            let branch0_row_47 = branches1_41[0];
             let base_link_d_ry = branch0_row_47 + hr_lower_leg_t58;
-            let branch0_row_49 = branches1[43][0];
+            let branch0_row_49 = branches1_43[0];
             let base_link_minus_d_rz = branch0_row_49 + hr_lower_leg_t59;
             // base_link: U, Mj, k and the reduced inertia M' (4.44)
             let base_link_minus_rho = 1.0 / base_link_minus_m_xx;
@@ -6280,19 +6510,27 @@ impl Solo12 {
             let p_5 = p.get(5, 0);
             let base_link_t90 = p_5 + base_link_t89;
             let base_link_e_2 = base_link_rho_2 * base_link_t90;
+            v.set(5, 0, base_link_e_2);
+            kept[0] = base_link_e_2;
             // base_link: velocity and joint rate (4.40)
             let base_link_t91 = base_link_k_rz_4 * base_link_e_2;
             let base_link_minus_v = base_link_minus_e_4 + base_link_t91;
+            v.set(4, 0, -base_link_minus_v);
+            kept[1] = base_link_minus_v;
             let base_link_t92 = base_link_minus_k_ry_3 * base_link_minus_v;
             let base_link_t93 = base_link_k_rz_3 * base_link_e_2;
             let base_link_t94 = base_link_t92 + base_link_t93;
             let base_link_v = base_link_e - base_link_t94;
+            v.set(3, 0, base_link_v);
+            kept[2] = base_link_v;
             let base_link_t95 = base_link_k_rx * base_link_v;
             let base_link_t96 = base_link_k_ry * base_link_minus_v;
             let base_link_t97 = base_link_t95 - base_link_t96;
             let base_link_t98 = base_link_minus_k_rz * base_link_e_2;
             let base_link_t99 = base_link_t97 - base_link_t98;
             let base_link_minus_v_2 = base_link_minus_e_3 + base_link_t99;
+            v.set(2, 0, -base_link_minus_v_2);
+            kept[3] = base_link_minus_v_2;
             let base_link_t100 = base_link_minus_k_z_2 * base_link_minus_v_2;
             let base_link_t101 = base_link_minus_k_rx_2 * base_link_v;
             let base_link_t102 = base_link_minus_k_ry_2 * base_link_minus_v;
@@ -6301,6 +6539,8 @@ impl Solo12 {
             let base_link_t105 = base_link_t103 - base_link_t104;
             let base_link_t106 = base_link_t100 - base_link_t105;
             let base_link_minus_v_3 = base_link_minus_e_2 + base_link_t106;
+            v.set(1, 0, -base_link_minus_v_3);
+            kept[4] = base_link_minus_v_3;
             let base_link_t107 = base_link_k_y * base_link_minus_v_3;
             let base_link_t108 = base_link_minus_k_z * base_link_minus_v_2;
             let base_link_t109 = base_link_t107 - base_link_t108;
@@ -6312,19 +6552,11 @@ impl Solo12 {
             let base_link_t115 = base_link_t109 + base_link_t114;
             let base_link_minus_v_4 = base_link_minus_e - base_link_t115;
             v.set(0, 0, -base_link_minus_v_4);
-            v.set(1, 0, -base_link_minus_v_3);
-            v.set(2, 0, -base_link_minus_v_2);
-            v.set(3, 0, base_link_v);
-            v.set(4, 0, -base_link_minus_v);
-            v.set(5, 0, base_link_e_2);
-            kept[0] = base_link_e_2;
-            kept[1] = base_link_minus_v;
-            kept[2] = base_link_v;
-            kept[3] = base_link_minus_v_2;
-            kept[4] = base_link_minus_v_3;
             kept[5] = base_link_minus_v_4;
         }
-        let mut branches3 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 3]);
+        let mut branches3_0 = [0.0; LANES];
+        let mut branches3_1 = [0.0; LANES];
+        let mut branches3_2 = [0.0; LANES];
         {
             let table = Self::VELOCITIES_BRANCHES0;
             for k in 0..4 {
@@ -6337,25 +6569,26 @@ impl Solo12 {
                 let fl_shoulder_t1 = table_0 * carried_3;
                 let carried_2 = -kept[3];
                 let fl_shoulder_hat_y = carried_2 + fl_shoulder_t1;
-                let row_17 = branches1[11][k];
+                let row_17 = branches1_11[k];
                 let carried_1 = -kept[4];
                 let fl_shoulder_t2 = row_17 * carried_1;
-                let row_18 = branches1[12][k];
+                let row_18 = branches1_12[k];
                 let fl_shoulder_t3 = row_18 * fl_shoulder_hat_y;
                 let fl_shoulder_t4 = fl_shoulder_t2 - fl_shoulder_t3;
-                let row_19 = branches1[13][k];
+                let row_19 = branches1_13[k];
                 let fl_shoulder_t5 = row_19 * fl_shoulder_hat_z;
                 let fl_shoulder_t6 = fl_shoulder_t4 + fl_shoulder_t5;
-                let row_20 = branches1[14][k];
+                let row_20 = branches1_14[k];
                 let carried_4 = -kept[1];
                 let fl_shoulder_t7 = row_20 * carried_4;
-                let row_21 = branches1[15][k];
+                let row_21 = branches1_15[k];
                 let fl_shoulder_t8 = row_21 * carried_5;
                 let fl_shoulder_t9 = fl_shoulder_t7 - fl_shoulder_t8;
                 let fl_shoulder_t10 = fl_shoulder_t6 - fl_shoulder_t9;
-                let row_43 = branches1[37][k];
+                let row_43 = branches1_37[k];
                 let fl_shoulder_minus_omega_rz = row_43 + fl_shoulder_t10;
                 let fl_shoulder_minus_v = carried_3 + fl_shoulder_minus_omega_rz;
+                branches3_0[k] = -fl_shoulder_minus_v;
                 let table_1 = table[1][k];
                 let fl_shoulder_t11 = table_1 * carried_5;
                 let fl_shoulder_t12 = carried_1 + fl_shoulder_t11;
@@ -6372,52 +6605,51 @@ impl Solo12 {
                 let fl_shoulder_t19 = row_0 * carried_5;
                 let fl_shoulder_t20 = row_1 * carried_4;
                 let fl_shoulder_omega_ry = fl_shoulder_t19 + fl_shoulder_t20;
-                let row_11 = branches1[5][k];
+                let row_11 = branches1_5[k];
                 let fl_upper_leg_t0 = row_11 * fl_shoulder_omega_x;
-                let row_12 = branches1[6][k];
+                let row_12 = branches1_6[k];
                 let fl_upper_leg_t1 = row_12 * fl_shoulder_hat_z;
                 let fl_upper_leg_t2 = fl_upper_leg_t0 + fl_upper_leg_t1;
-                let row_13 = branches1[7][k];
+                let row_13 = branches1_7[k];
                 let fl_upper_leg_t3 = row_13 * fl_shoulder_omega_rx;
-                let row_14 = branches1[8][k];
+                let row_14 = branches1_8[k];
                 let fl_upper_leg_t4 = row_14 * fl_shoulder_minus_omega_rz;
                 let fl_upper_leg_t5 = fl_upper_leg_t3 + fl_upper_leg_t4;
                 let fl_upper_leg_t6 = fl_upper_leg_t2 - fl_upper_leg_t5;
-                let row_16 = branches1[10][k];
+                let row_16 = branches1_10[k];
                 let fl_upper_leg_omega_rz = row_16 + fl_upper_leg_t6;
                 let fl_upper_leg_v = fl_upper_leg_omega_rz - fl_shoulder_omega_ry;
-                let row_6 = branches1[0][k];
+                branches3_1[k] = fl_upper_leg_v;
+                let row_6 = branches1_0[k];
                 let fl_upper_leg_t7 = row_6 * fl_shoulder_omega_x;
-                let row_7 = branches1[1][k];
+                let row_7 = branches1_1[k];
                 let fl_upper_leg_t8 = row_7 * fl_shoulder_hat_z;
                 let fl_upper_leg_t9 = fl_upper_leg_t7 + fl_upper_leg_t8;
-                let row_8 = branches1[2][k];
+                let row_8 = branches1_2[k];
                 let fl_upper_leg_t10 = row_8 * fl_shoulder_omega_rx;
-                let row_9 = branches1[3][k];
+                let row_9 = branches1_3[k];
                 let fl_upper_leg_t11 = row_9 * fl_shoulder_minus_omega_rz;
                 let fl_upper_leg_t12 = fl_upper_leg_t10 + fl_upper_leg_t11;
-                let row_10 = branches1[4][k];
+                let row_10 = branches1_4[k];
                 let fl_upper_leg_t13 = row_10 * fl_upper_leg_omega_rz;
                 let fl_upper_leg_t14 = fl_upper_leg_t12 + fl_upper_leg_t13;
                 let fl_upper_leg_t15 = fl_upper_leg_t9 - fl_upper_leg_t14;
-                let row_15 = branches1[9][k];
+                let row_15 = branches1_9[k];
                 let fl_lower_leg_v = row_15 + fl_upper_leg_t15;
-                branches3[0][k] = -fl_shoulder_minus_v;
-                branches3[1][k] = fl_upper_leg_v;
-                branches3[2][k] = fl_lower_leg_v;
+                branches3_2[k] = fl_lower_leg_v;
             }
-            v.set(6, 0, branches3[0][0]);
-            v.set(9, 0, branches3[0][1]);
-            v.set(12, 0, branches3[0][2]);
-            v.set(15, 0, branches3[0][3]);
-            v.set(7, 0, branches3[1][0]);
-            v.set(10, 0, branches3[1][1]);
-            v.set(13, 0, branches3[1][2]);
-            v.set(16, 0, branches3[1][3]);
-            v.set(8, 0, branches3[2][0]);
-            v.set(11, 0, branches3[2][1]);
-            v.set(14, 0, branches3[2][2]);
-            v.set(17, 0, branches3[2][3]);
+            v.set(6, 0, branches3_0[0]);
+            v.set(9, 0, branches3_0[1]);
+            v.set(12, 0, branches3_0[2]);
+            v.set(15, 0, branches3_0[3]);
+            v.set(7, 0, branches3_1[0]);
+            v.set(10, 0, branches3_1[1]);
+            v.set(13, 0, branches3_1[2]);
+            v.set(16, 0, branches3_1[3]);
+            v.set(8, 0, branches3_2[0]);
+            v.set(11, 0, branches3_2[1]);
+            v.set(14, 0, branches3_2[2]);
+            v.set(17, 0, branches3_2[3]);
         }
     }
 
@@ -6436,7 +6668,7 @@ impl Solo12 {
     /// Momenta from velocities: `p = M(q) v`.
     /// 650 operations: 294 additions, 356 multiplications, 0 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn momenta(&self, q: &[f64; 19], v: &[f64; 18], p: &mut [f64; 18]) {
-        Self::momenta_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, p);
+        ::multibody::runtime::kernel::call_exact::<Self, 2, _>((q, v, p,));
     }
 
     #[inline(always)]
@@ -6476,45 +6708,79 @@ impl Solo12 {
             angles[11][l] = hr_lower_leg_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 12>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 18]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = v.get(6, l); }
-        for l in 0..LANES { given[7][l] = v.get(7, l); }
-        for l in 0..LANES { given[8][l] = v.get(8, l); }
-        for l in 0..LANES { given[9][l] = v.get(9, l); }
-        for l in 0..LANES { given[10][l] = v.get(10, l); }
-        for l in 0..LANES { given[11][l] = v.get(11, l); }
-        for l in 0..LANES { given[12][l] = v.get(12, l); }
-        for l in 0..LANES { given[13][l] = v.get(13, l); }
-        for l in 0..LANES { given[14][l] = v.get(14, l); }
-        for l in 0..LANES { given[15][l] = v.get(15, l); }
-        for l in 0..LANES { given[16][l] = v.get(16, l); }
-        for l in 0..LANES { given[17][l] = v.get(17, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 18]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = v.get(6, l); }
+        for l in 0..LANES { given_7[l] = v.get(7, l); }
+        for l in 0..LANES { given_8[l] = v.get(8, l); }
+        for l in 0..LANES { given_9[l] = v.get(9, l); }
+        for l in 0..LANES { given_10[l] = v.get(10, l); }
+        for l in 0..LANES { given_11[l] = v.get(11, l); }
+        for l in 0..LANES { given_12[l] = v.get(12, l); }
+        for l in 0..LANES { given_13[l] = v.get(13, l); }
+        for l in 0..LANES { given_14[l] = v.get(14, l); }
+        for l in 0..LANES { given_15[l] = v.get(15, l); }
+        for l in 0..LANES { given_16[l] = v.get(16, l); }
+        for l in 0..LANES { given_17[l] = v.get(17, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let v_6 = given[6][l];
-            let v_7 = given[7][l];
-            let v_8 = given[8][l];
-            let v_9 = given[9][l];
-            let v_10 = given[10][l];
-            let v_11 = given[11][l];
-            let v_12 = given[12][l];
-            let v_13 = given[13][l];
-            let v_14 = given[14][l];
-            let v_15 = given[15][l];
-            let v_16 = given[16][l];
-            let v_17 = given[17][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let v_6 = given_6[l];
+            let v_7 = given_7[l];
+            let v_8 = given_8[l];
+            let v_9 = given_9[l];
+            let v_10 = given_10[l];
+            let v_11 = given_11[l];
+            let v_12 = given_12[l];
+            let v_13 = given_13[l];
+            let v_14 = given_14[l];
+            let v_15 = given_15[l];
+            let v_16 = given_16[l];
+            let v_17 = given_17[l];
             // FL_SHOULDER: sine and cosine, rotation
             let fl_shoulder_sin = sines[0][l];
             let fl_shoulder_cos = cosines[0][l];
@@ -7233,34 +7499,34 @@ impl Solo12 {
             let base_link_p_rx = fr_shoulder_t44 + fl_shoulder_t43;
             let base_link_p_ry = fr_shoulder_t45 + fl_shoulder_t39;
             let base_link_p_rz = fr_shoulder_t46 - fl_shoulder_t45;
-            results[0][l] = base_link_p_x;
-            results[1][l] = base_link_p_y;
-            results[2][l] = base_link_p_z;
-            results[3][l] = base_link_p_rx;
-            results[4][l] = base_link_p_ry;
-            results[5][l] = base_link_p_rz;
-            results[6][l] = fl_shoulder_p_rz;
-            results[7][l] = -fl_upper_leg_minus_p_rz;
-            results[8][l] = -fl_lower_leg_minus_p_rz;
-            results[9][l] = -fr_shoulder_minus_p_rz;
-            results[10][l] = fr_upper_leg_p_rz;
-            results[11][l] = fr_lower_leg_p_rz;
-            results[12][l] = -hl_shoulder_minus_p_rz;
-            results[13][l] = -hl_upper_leg_minus_p_rz;
-            results[14][l] = -hl_lower_leg_minus_p_rz;
-            results[15][l] = hr_shoulder_p_rz;
-            results[16][l] = hr_upper_leg_p_rz;
-            results[17][l] = hr_lower_leg_p_rz;
+            result_0[l] = base_link_p_x;
+            result_1[l] = base_link_p_y;
+            result_2[l] = base_link_p_z;
+            result_3[l] = base_link_p_rx;
+            result_4[l] = base_link_p_ry;
+            result_5[l] = base_link_p_rz;
+            result_6[l] = fl_shoulder_p_rz;
+            result_7[l] = -fl_upper_leg_minus_p_rz;
+            result_8[l] = -fl_lower_leg_minus_p_rz;
+            result_9[l] = -fr_shoulder_minus_p_rz;
+            result_10[l] = fr_upper_leg_p_rz;
+            result_11[l] = fr_lower_leg_p_rz;
+            result_12[l] = -hl_shoulder_minus_p_rz;
+            result_13[l] = -hl_upper_leg_minus_p_rz;
+            result_14[l] = -hl_lower_leg_minus_p_rz;
+            result_15[l] = hr_shoulder_p_rz;
+            result_16[l] = hr_upper_leg_p_rz;
+            result_17[l] = hr_lower_leg_p_rz;
         }
-        p.give_pair(0, [&results[0], &results[1]]);
-        p.give_pair(2, [&results[2], &results[3]]);
-        p.give_pair(4, [&results[4], &results[5]]);
-        p.give_pair(6, [&results[6], &results[7]]);
-        p.give_pair(8, [&results[8], &results[9]]);
-        p.give_pair(10, [&results[10], &results[11]]);
-        p.give_pair(12, [&results[12], &results[13]]);
-        p.give_pair(14, [&results[14], &results[15]]);
-        p.give_pair(16, [&results[16], &results[17]]);
+        p.give_pair(0, [&result_0, &result_1]);
+        p.give_pair(2, [&result_2, &result_3]);
+        p.give_pair(4, [&result_4, &result_5]);
+        p.give_pair(6, [&result_6, &result_7]);
+        p.give_pair(8, [&result_8, &result_9]);
+        p.give_pair(10, [&result_10, &result_11]);
+        p.give_pair(12, [&result_12, &result_13]);
+        p.give_pair(14, [&result_14, &result_15]);
+        p.give_pair(16, [&result_16, &result_17]);
     }
 
     /// One state: like branches at the same time, in the lanes of vector registers.
@@ -7284,7 +7550,25 @@ impl Solo12 {
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 3>(&angles);
         let mut kept = [0.0; 6];
-        let mut branches1 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 19]);
+        let mut branches1_0 = [0.0; LANES];
+        let mut branches1_1 = [0.0; LANES];
+        let mut branches1_2 = [0.0; LANES];
+        let mut branches1_3 = [0.0; LANES];
+        let mut branches1_4 = [0.0; LANES];
+        let mut branches1_5 = [0.0; LANES];
+        let mut branches1_6 = [0.0; LANES];
+        let mut branches1_7 = [0.0; LANES];
+        let mut branches1_8 = [0.0; LANES];
+        let mut branches1_9 = [0.0; LANES];
+        let mut branches1_10 = [0.0; LANES];
+        let mut branches1_11 = [0.0; LANES];
+        let mut branches1_12 = [0.0; LANES];
+        let mut branches1_13 = [0.0; LANES];
+        let mut branches1_14 = [0.0; LANES];
+        let mut branches1_15 = [0.0; LANES];
+        let mut branches1_16 = [0.0; LANES];
+        let mut branches1_17 = [0.0; LANES];
+        let mut branches1_18 = [0.0; LANES];
         {
             let given15 = [v.get(6, 0), v.get(9, 0), v.get(12, 0), v.get(15, 0)];
             let given16 = [v.get(7, 0), v.get(10, 0), v.get(13, 0), v.get(16, 0)];
@@ -7296,31 +7580,40 @@ impl Solo12 {
                 let row_2 = sines[1][k];
                 let fl_upper_leg_t1 = table_4 * row_2;
                 let fl_upper_leg_t2 = fl_upper_leg_t0 - fl_upper_leg_t1;
+                branches1_0[k] = fl_upper_leg_t2;
                 let fl_upper_leg_t3 = 0.01771278698415 * row_2;
                 let fl_upper_leg_t4 = table_4 * row_3;
                 let fl_upper_leg_t5 = fl_upper_leg_t3 + fl_upper_leg_t4;
+                branches1_1[k] = fl_upper_leg_t5;
                 let fl_upper_leg_t6 = 0.0022644781431582876 * row_2;
                 let fl_upper_leg_t7 = row_3 + row_3;
                 let table_5 = table[5][k];
                 let fl_upper_leg_t8 = table_5 * fl_upper_leg_t7;
                 let fl_upper_leg_t9 = fl_upper_leg_t6 - fl_upper_leg_t8;
                 let fl_upper_leg_t10 = row_2 * fl_upper_leg_t9;
+                branches1_2[k] = fl_upper_leg_t10;
                 let fl_upper_leg_t11 = row_3 * fl_upper_leg_t9;
                 let fl_upper_leg_t12 = table_5 + fl_upper_leg_t11;
+                branches1_3[k] = fl_upper_leg_t12;
                 let table_6 = table[6][k];
                 let fl_upper_leg_t13 = table_6 * row_3;
                 let fl_upper_leg_t14 = 6.823068516838894e-8 * row_2;
                 let fl_upper_leg_t15 = fl_upper_leg_t13 - fl_upper_leg_t14;
+                branches1_4[k] = fl_upper_leg_t15;
                 let fl_upper_leg_t16 = table_6 * row_2;
                 let fl_upper_leg_t17 = 6.823068516838894e-8 * row_3;
                 let fl_upper_leg_t18 = fl_upper_leg_t16 + fl_upper_leg_t17;
+                branches1_5[k] = fl_upper_leg_t18;
                 let fl_lower_leg_t0 = 0.16 * row_3;
+                branches1_6[k] = fl_lower_leg_t0;
                 let fl_lower_leg_t1 = 0.16 * row_2;
+                branches1_7[k] = fl_lower_leg_t1;
                 let table_0 = table[0][k];
                 let carried_5 = v.get(5, 0);
                 let fl_shoulder_t0 = table_0 * carried_5;
                 let carried_0 = v.get(0, 0);
                 let fl_shoulder_hat_z = carried_0 - fl_shoulder_t0;
+                branches1_8[k] = fl_shoulder_hat_z;
                 let carried_3 = v.get(3, 0);
                 let fl_shoulder_t1 = table_0 * carried_3;
                 let carried_2 = v.get(2, 0);
@@ -7337,25 +7630,32 @@ impl Solo12 {
                 let row_1 = cosines[0][k];
                 let fl_shoulder_t8 = row_1 * fl_shoulder_t6;
                 let fl_shoulder_hat_x = fl_shoulder_t7 - fl_shoulder_t8;
+                branches1_9[k] = fl_shoulder_hat_x;
                 let fl_shoulder_t9 = row_0 * fl_shoulder_t6;
                 let fl_shoulder_t10 = row_1 * fl_shoulder_t4;
                 let fl_shoulder_hat_y = fl_shoulder_t9 + fl_shoulder_t10;
+                branches1_10[k] = fl_shoulder_hat_y;
                 let fl_shoulder_t11 = row_0 * carried_4;
                 let fl_shoulder_t12 = row_1 * carried_5;
                 let fl_shoulder_hat_rx = fl_shoulder_t11 - fl_shoulder_t12;
+                branches1_11[k] = fl_shoulder_hat_rx;
                 let fl_shoulder_t13 = row_0 * carried_5;
                 let fl_shoulder_t14 = row_1 * carried_4;
                 let fl_shoulder_hat_ry = fl_shoulder_t13 + fl_shoulder_t14;
+                branches1_12[k] = fl_shoulder_hat_ry;
                 let v_6 = given15[k];
                 let fl_shoulder_omega_rz = v_6 + carried_3;
+                branches1_13[k] = fl_shoulder_omega_rz;
                 let v_7 = given16[k];
                 let fl_upper_leg_omega_rz = v_7 + fl_shoulder_hat_ry;
+                branches1_14[k] = fl_upper_leg_omega_rz;
                 let fl_lower_leg_t2 = fl_lower_leg_t0 * fl_upper_leg_omega_rz;
                 let fl_lower_leg_t3 = fl_shoulder_hat_z - fl_lower_leg_t2;
                 let fl_lower_leg_t4 = fl_lower_leg_t0 * fl_shoulder_omega_rz;
                 let fl_lower_leg_t5 = fl_shoulder_hat_y + fl_lower_leg_t4;
                 let fl_lower_leg_t6 = fl_lower_leg_t1 * fl_shoulder_hat_rx;
                 let fl_lower_leg_hat_z = fl_lower_leg_t5 + fl_lower_leg_t6;
+                branches1_15[k] = fl_lower_leg_hat_z;
                 let fl_lower_leg_t7 = fl_lower_leg_t1 * fl_upper_leg_omega_rz;
                 let fl_lower_leg_t8 = fl_shoulder_hat_x - fl_lower_leg_t7;
                 let row_13 = cosines[2][k];
@@ -7363,93 +7663,85 @@ impl Solo12 {
                 let row_12 = sines[2][k];
                 let fl_lower_leg_t10 = row_12 * fl_lower_leg_t8;
                 let fl_lower_leg_minus_hat_y = fl_lower_leg_t9 + fl_lower_leg_t10;
+                branches1_16[k] = fl_lower_leg_minus_hat_y;
                 let fl_lower_leg_t11 = row_13 * fl_shoulder_hat_rx;
                 let fl_lower_leg_t12 = row_12 * fl_shoulder_omega_rz;
                 let fl_lower_leg_hat_rx = fl_lower_leg_t11 - fl_lower_leg_t12;
+                branches1_17[k] = fl_lower_leg_hat_rx;
                 let fl_lower_leg_t13 = row_13 * fl_shoulder_omega_rz;
                 let fl_lower_leg_t14 = row_12 * fl_shoulder_hat_rx;
                 let fl_lower_leg_minus_hat_ry = fl_lower_leg_t13 + fl_lower_leg_t14;
-                branches1[0][k] = fl_upper_leg_t2;
-                branches1[1][k] = fl_upper_leg_t5;
-                branches1[2][k] = fl_upper_leg_t10;
-                branches1[3][k] = fl_upper_leg_t12;
-                branches1[4][k] = fl_upper_leg_t15;
-                branches1[5][k] = fl_upper_leg_t18;
-                branches1[6][k] = fl_lower_leg_t0;
-                branches1[7][k] = fl_lower_leg_t1;
-                branches1[8][k] = fl_shoulder_hat_z;
-                branches1[9][k] = fl_shoulder_hat_x;
-                branches1[10][k] = fl_shoulder_hat_y;
-                branches1[11][k] = fl_shoulder_hat_rx;
-                branches1[12][k] = fl_shoulder_hat_ry;
-                branches1[13][k] = fl_shoulder_omega_rz;
-                branches1[14][k] = fl_upper_leg_omega_rz;
-                branches1[15][k] = fl_lower_leg_hat_z;
-                branches1[16][k] = fl_lower_leg_minus_hat_y;
-                branches1[17][k] = fl_lower_leg_hat_rx;
-                branches1[18][k] = fl_lower_leg_minus_hat_ry;
+                branches1_18[k] = fl_lower_leg_minus_hat_ry;
             }
         }
         {
             let v_3 = v.get(3, 0);
             // base_link: momentum
             let base_link_t0 = 0.016036324706249997 * v_3;
+            kept[0] = base_link_t0;
             let v_4 = v.get(4, 0);
             let base_link_t1 = 0.05721008180454845 * v_4;
+            kept[1] = base_link_t1;
             let v_5 = v.get(5, 0);
             let base_link_t2 = 0.07284082651079846 * v_5;
+            kept[2] = base_link_t2;
             let v_0 = v.get(0, 0);
             let base_link_t3 = 2.50000279 * v_0;
+            kept[3] = base_link_t3;
             let v_1 = v.get(1, 0);
             let base_link_t4 = 2.50000279 * v_1;
+            kept[4] = base_link_t4;
             let v_2 = v.get(2, 0);
             let base_link_t5 = 2.50000279 * v_2;
-            kept[0] = base_link_t0;
-            kept[1] = base_link_t1;
-            kept[2] = base_link_t2;
-            kept[3] = base_link_t3;
-            kept[4] = base_link_t4;
             kept[5] = base_link_t5;
         }
-        let mut branches3 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
+        let mut branches3_0 = [0.0; LANES];
+        let mut branches3_1 = [0.0; LANES];
+        let mut branches3_2 = [0.0; LANES];
+        let mut branches3_3 = [0.0; LANES];
+        let mut branches3_4 = [0.0; LANES];
+        let mut branches3_5 = [0.0; LANES];
+        let mut branches3_6 = [0.0; LANES];
+        let mut branches3_7 = [0.0; LANES];
+        let mut branches3_8 = [0.0; LANES];
         {
             let given1 = [v.get(8, 0), v.get(11, 0), v.get(14, 0), v.get(17, 0)];
             let table = Self::MOMENTA_BRANCHES0;
             for k in 0..4 {
-                let row_6 = branches1[2][k];
+                let row_6 = branches1_2[k];
                 let fl_upper_leg_t0 = row_6 - 0.0022644781431582876;
                 let v_8 = given1[k];
-                let row_20 = branches1[14][k];
+                let row_20 = branches1_14[k];
                 let fl_lower_leg_omega_rz = v_8 + row_20;
-                let row_17 = branches1[11][k];
+                let row_17 = branches1_11[k];
                 let fl_shoulder_t0 = 0.003148870268177617 * row_17;
                 let table_3 = table[3][k];
-                let row_19 = branches1[13][k];
+                let row_19 = branches1_13[k];
                 let fl_shoulder_t1 = table_3 * row_19;
-                let row_18 = branches1[12][k];
+                let row_18 = branches1_12[k];
                 let fl_shoulder_t2 = table_3 * row_18;
                 let fl_shoulder_t3 = 0.003179970268177617 * row_19;
                 let fl_shoulder_t4 = fl_shoulder_t2 + fl_shoulder_t3;
                 let table_2 = table[2][k];
                 let fl_shoulder_t5 = table_2 * row_19;
                 let fl_shoulder_t6 = table_2 * row_17;
-                let row_14 = branches1[8][k];
+                let row_14 = branches1_8[k];
                 let fl_shoulder_t7 = table_2 * row_14;
-                let row_15 = branches1[9][k];
+                let row_15 = branches1_9[k];
                 let fl_shoulder_t8 = table_2 * row_15;
                 let fl_shoulder_t9 = fl_shoulder_t0 + fl_shoulder_t7;
                 let fl_shoulder_t10 = fl_shoulder_t4 - fl_shoulder_t8;
                 let fl_upper_leg_t1 = fl_upper_leg_t0 * row_17;
-                let row_7 = branches1[3][k];
+                let row_7 = branches1_3[k];
                 let fl_upper_leg_t2 = row_7 * row_19;
                 let fl_upper_leg_t3 = fl_upper_leg_t1 + fl_upper_leg_t2;
-                let row_8 = branches1[4][k];
+                let row_8 = branches1_4[k];
                 let fl_upper_leg_t4 = row_8 * row_20;
                 let fl_upper_leg_t5 = fl_upper_leg_t3 + fl_upper_leg_t4;
                 let fl_upper_leg_t6 = row_7 * row_17;
                 let fl_upper_leg_t7 = row_6 * row_19;
                 let fl_upper_leg_t8 = fl_upper_leg_t6 - fl_upper_leg_t7;
-                let row_9 = branches1[5][k];
+                let row_9 = branches1_5[k];
                 let fl_upper_leg_t9 = row_9 * row_20;
                 let fl_upper_leg_t10 = fl_upper_leg_t8 - fl_upper_leg_t9;
                 let fl_upper_leg_t11 = row_8 * row_17;
@@ -7457,14 +7749,14 @@ impl Solo12 {
                 let fl_upper_leg_t13 = fl_upper_leg_t11 - fl_upper_leg_t12;
                 let fl_upper_leg_t14 = 0.0022955781994879005 * row_20;
                 let fl_upper_leg_t15 = fl_upper_leg_t13 + fl_upper_leg_t14;
-                let row_5 = branches1[1][k];
+                let row_5 = branches1_1[k];
                 let fl_upper_leg_t16 = row_5 * row_20;
-                let row_4 = branches1[0][k];
+                let row_4 = branches1_0[k];
                 let fl_upper_leg_t17 = row_4 * row_20;
                 let fl_upper_leg_t18 = row_5 * row_17;
                 let fl_upper_leg_t19 = row_4 * row_19;
                 let fl_upper_leg_t20 = fl_upper_leg_t18 + fl_upper_leg_t19;
-                let row_16 = branches1[10][k];
+                let row_16 = branches1_10[k];
                 let fl_upper_leg_t21 = row_5 * row_16;
                 let fl_upper_leg_t22 = row_4 * row_16;
                 let fl_upper_leg_t23 = row_4 * row_14;
@@ -7473,7 +7765,7 @@ impl Solo12 {
                 let fl_upper_leg_t26 = fl_upper_leg_t5 + fl_upper_leg_t21;
                 let fl_upper_leg_t27 = fl_upper_leg_t10 + fl_upper_leg_t22;
                 let fl_upper_leg_t28 = fl_upper_leg_t15 - fl_upper_leg_t25;
-                let row_23 = branches1[17][k];
+                let row_23 = branches1_17[k];
                 let fl_lower_leg_t0 = 0.0005396092213171668 * row_23;
                 let table_7 = table[7][k];
                 let fl_lower_leg_t1 = table_7 * fl_lower_leg_omega_rz;
@@ -7482,13 +7774,14 @@ impl Solo12 {
                 let fl_lower_leg_t3 = 0.0005426192213171668 * fl_lower_leg_omega_rz;
                 let fl_lower_leg_t4 = fl_lower_leg_t2 + fl_lower_leg_t3;
                 let fl_lower_leg_p_y = 0.0038482516772413004 * fl_lower_leg_omega_rz;
-                let row_24 = branches1[18][k];
+                let row_24 = branches1_18[k];
                 let fl_lower_leg_p_z = 0.0038482516772413004 * row_24;
-                let row_21 = branches1[15][k];
+                let row_21 = branches1_15[k];
                 let fl_lower_leg_minus_p_ry = 0.0038482516772413004 * row_21;
-                let row_22 = branches1[16][k];
+                let row_22 = branches1_16[k];
                 let fl_lower_leg_t5 = 0.0038482516772413004 * row_22;
                 let fl_lower_leg_p_rz = fl_lower_leg_t4 - fl_lower_leg_t5;
+                branches3_2[k] = fl_lower_leg_p_rz;
                 let row_12 = sines[2][k];
                 let fl_lower_leg_t6 = row_12 * fl_lower_leg_p_y;
                 let row_13 = cosines[2][k];
@@ -7499,12 +7792,12 @@ impl Solo12 {
                 let fl_lower_leg_t11 = row_12 * fl_lower_leg_minus_p_rx;
                 let fl_lower_leg_t12 = row_13 * fl_lower_leg_minus_p_ry;
                 let fl_lower_leg_t13 = fl_lower_leg_t11 + fl_lower_leg_t12;
-                let row_11 = branches1[7][k];
+                let row_11 = branches1_7[k];
                 let fl_lower_leg_t14 = row_11 * fl_lower_leg_t6;
                 let fl_lower_leg_t15 = fl_lower_leg_p_rz + fl_lower_leg_t14;
                 let fl_lower_leg_t16 = row_11 * fl_lower_leg_p_z;
                 let fl_lower_leg_t17 = fl_lower_leg_t10 - fl_lower_leg_t16;
-                let row_10 = branches1[6][k];
+                let row_10 = branches1_6[k];
                 let fl_lower_leg_t18 = row_10 * fl_lower_leg_p_z;
                 let fl_lower_leg_t19 = fl_lower_leg_t13 + fl_lower_leg_t18;
                 let fl_lower_leg_t20 = row_10 * fl_lower_leg_t7;
@@ -7515,19 +7808,24 @@ impl Solo12 {
                 let fl_upper_leg_p_rx = fl_upper_leg_t26 - fl_lower_leg_t17;
                 let fl_upper_leg_minus_p_ry = fl_upper_leg_t27 + fl_lower_leg_t19;
                 let fl_upper_leg_p_rz = fl_upper_leg_t28 + fl_lower_leg_t21;
+                branches3_1[k] = fl_upper_leg_p_rz;
                 let fl_shoulder_minus_p_x = fl_shoulder_t5 + fl_upper_leg_minus_p_x;
                 let fl_shoulder_p_z = fl_shoulder_t6 - fl_upper_leg_p_y;
+                branches3_3[k] = fl_shoulder_p_z;
                 let fl_shoulder_p_rx = fl_shoulder_t9 + fl_upper_leg_p_rx;
                 let fl_shoulder_p_ry = fl_shoulder_t1 + fl_upper_leg_p_rz;
                 let fl_shoulder_p_rz = fl_shoulder_t10 + fl_upper_leg_minus_p_ry;
+                branches3_0[k] = fl_shoulder_p_rz;
                 let row_0 = sines[0][k];
                 let fl_shoulder_t11 = row_0 * fl_shoulder_minus_p_x;
                 let row_1 = cosines[0][k];
                 let fl_shoulder_t12 = row_1 * fl_upper_leg_p_z;
                 let fl_shoulder_t13 = fl_shoulder_t11 - fl_shoulder_t12;
+                branches3_4[k] = fl_shoulder_t13;
                 let fl_shoulder_t14 = row_1 * fl_shoulder_minus_p_x;
                 let fl_shoulder_t15 = row_0 * fl_upper_leg_p_z;
                 let fl_shoulder_t16 = fl_shoulder_t14 + fl_shoulder_t15;
+                branches3_5[k] = fl_shoulder_t16;
                 let fl_shoulder_t17 = row_0 * fl_shoulder_p_rx;
                 let fl_shoulder_t18 = row_1 * fl_shoulder_p_ry;
                 let fl_shoulder_t19 = fl_shoulder_t17 + fl_shoulder_t18;
@@ -7537,97 +7835,91 @@ impl Solo12 {
                 let table_1 = table[1][k];
                 let fl_shoulder_t23 = table_1 * fl_shoulder_t16;
                 let fl_shoulder_t24 = fl_shoulder_t19 - fl_shoulder_t23;
+                branches3_6[k] = fl_shoulder_t24;
                 let fl_shoulder_t25 = table_1 * fl_shoulder_t13;
                 let fl_shoulder_t26 = fl_shoulder_t22 + fl_shoulder_t25;
                 let table_0 = table[0][k];
                 let fl_shoulder_t27 = table_0 * fl_shoulder_t16;
                 let fl_shoulder_t28 = fl_shoulder_p_rz + fl_shoulder_t27;
+                branches3_7[k] = fl_shoulder_t28;
                 let fl_shoulder_t29 = table_0 * fl_shoulder_p_z;
                 let fl_shoulder_t30 = fl_shoulder_t26 + fl_shoulder_t29;
-                branches3[0][k] = fl_shoulder_p_rz;
-                branches3[1][k] = fl_upper_leg_p_rz;
-                branches3[2][k] = fl_lower_leg_p_rz;
-                branches3[3][k] = fl_shoulder_p_z;
-                branches3[4][k] = fl_shoulder_t13;
-                branches3[5][k] = fl_shoulder_t16;
-                branches3[6][k] = fl_shoulder_t24;
-                branches3[7][k] = fl_shoulder_t28;
-                branches3[8][k] = fl_shoulder_t30;
+                branches3_8[k] = fl_shoulder_t30;
             }
-            p.set(6, 0, branches3[0][0]);
-            p.set(9, 0, branches3[0][1]);
-            p.set(12, 0, branches3[0][2]);
-            p.set(15, 0, branches3[0][3]);
-            p.set(7, 0, branches3[1][0]);
-            p.set(10, 0, branches3[1][1]);
-            p.set(13, 0, branches3[1][2]);
-            p.set(16, 0, branches3[1][3]);
-            p.set(8, 0, branches3[2][0]);
-            p.set(11, 0, branches3[2][1]);
-            p.set(14, 0, branches3[2][2]);
-            p.set(17, 0, branches3[2][3]);
+            p.set(6, 0, branches3_0[0]);
+            p.set(9, 0, branches3_0[1]);
+            p.set(12, 0, branches3_0[2]);
+            p.set(15, 0, branches3_0[3]);
+            p.set(7, 0, branches3_1[0]);
+            p.set(10, 0, branches3_1[1]);
+            p.set(13, 0, branches3_1[2]);
+            p.set(16, 0, branches3_1[3]);
+            p.set(8, 0, branches3_2[0]);
+            p.set(11, 0, branches3_2[1]);
+            p.set(14, 0, branches3_2[2]);
+            p.set(17, 0, branches3_2[3]);
         }
         {
             let kept_3 = kept[3];
-            let branch3_row_25 = branches3[3][3];
+            let branch3_row_25 = branches3_3[3];
             // HR_LOWER_LEG: momentum
             let hr_lower_leg_t0 = kept_3 + branch3_row_25;
             let kept_4 = kept[4];
-            let branch3_row_26 = branches3[4][3];
+            let branch3_row_26 = branches3_4[3];
             let hr_lower_leg_t1 = kept_4 - branch3_row_26;
             let kept_5 = kept[5];
-            let branch3_row_27 = branches3[5][3];
+            let branch3_row_27 = branches3_5[3];
             let hr_lower_leg_t2 = kept_5 + branch3_row_27;
             let kept_0 = kept[0];
-            let branch3_row_29 = branches3[7][3];
+            let branch3_row_29 = branches3_7[3];
             let hr_lower_leg_t3 = kept_0 + branch3_row_29;
             let kept_1 = kept[1];
-            let branch3_row_28 = branches3[6][3];
+            let branch3_row_28 = branches3_6[3];
             let hr_lower_leg_t4 = kept_1 + branch3_row_28;
             let kept_2 = kept[2];
-            let branch3_row_30 = branches3[8][3];
+            let branch3_row_30 = branches3_8[3];
             let hr_lower_leg_t5 = kept_2 - branch3_row_30;
-            let branch2_row_25 = branches3[3][2];
+            let branch2_row_25 = branches3_3[2];
             let hr_lower_leg_t6 = branch2_row_25 + hr_lower_leg_t0;
-            let branch2_row_26 = branches3[4][2];
+            let branch2_row_26 = branches3_4[2];
             let hr_lower_leg_t7 = branch2_row_26 - hr_lower_leg_t1;
-            let branch2_row_27 = branches3[5][2];
+            let branch2_row_27 = branches3_5[2];
             let hr_lower_leg_t8 = branch2_row_27 + hr_lower_leg_t2;
-            let branch2_row_29 = branches3[7][2];
+            let branch2_row_29 = branches3_7[2];
             let hr_lower_leg_t9 = branch2_row_29 + hr_lower_leg_t3;
-            let branch2_row_28 = branches3[6][2];
+            let branch2_row_28 = branches3_6[2];
             let hr_lower_leg_t10 = branch2_row_28 + hr_lower_leg_t4;
-            let branch2_row_30 = branches3[8][2];
+            let branch2_row_30 = branches3_8[2];
             let hr_lower_leg_t11 = branch2_row_30 - hr_lower_leg_t5;
-            let branch1_row_25 = branches3[3][1];
+            let branch1_row_25 = branches3_3[1];
             let hr_lower_leg_t12 = branch1_row_25 + hr_lower_leg_t6;
-            let branch1_row_26 = branches3[4][1];
+            let branch1_row_26 = branches3_4[1];
             let hr_lower_leg_t13 = branch1_row_26 + hr_lower_leg_t7;
-            let branch1_row_27 = branches3[5][1];
+            let branch1_row_27 = branches3_5[1];
             let hr_lower_leg_t14 = branch1_row_27 + hr_lower_leg_t8;
-            let branch1_row_29 = branches3[7][1];
+            let branch1_row_29 = branches3_7[1];
             let hr_lower_leg_t15 = branch1_row_29 + hr_lower_leg_t9;
-            let branch1_row_28 = branches3[6][1];
+            let branch1_row_28 = branches3_6[1];
             let hr_lower_leg_t16 = branch1_row_28 + hr_lower_leg_t10;
-            let branch1_row_30 = branches3[8][1];
+            let branch1_row_30 = branches3_8[1];
             let hr_lower_leg_t17 = branch1_row_30 + hr_lower_leg_t11;
-            let branch0_row_25 = branches3[3][0];
+            let branch0_row_25 = branches3_3[0];
             let base_link_p_x = branch0_row_25 + hr_lower_leg_t12;
-            let branch0_row_26 = branches3[4][0];
-            let base_link_minus_p_y = branch0_row_26 + hr_lower_leg_t13;
-            let branch0_row_27 = branches3[5][0];
-            let base_link_p_z = branch0_row_27 + hr_lower_leg_t14;
-            let branch0_row_29 = branches3[7][0];
-            let base_link_p_rx = branch0_row_29 + hr_lower_leg_t15;
-            let branch0_row_28 = branches3[6][0];
-            let base_link_p_ry = branch0_row_28 + hr_lower_leg_t16;
-            let branch0_row_30 = branches3[8][0];
-            let base_link_minus_p_rz = branch0_row_30 + hr_lower_leg_t17;
             p.set(0, 0, base_link_p_x);
+            let branch0_row_26 = branches3_4[0];
+            let base_link_minus_p_y = branch0_row_26 + hr_lower_leg_t13;
             p.set(1, 0, -base_link_minus_p_y);
+            let branch0_row_27 = branches3_5[0];
+            let base_link_p_z = branch0_row_27 + hr_lower_leg_t14;
             p.set(2, 0, base_link_p_z);
+            let branch0_row_29 = branches3_7[0];
+            let base_link_p_rx = branch0_row_29 + hr_lower_leg_t15;
             p.set(3, 0, base_link_p_rx);
+            let branch0_row_28 = branches3_6[0];
+            let base_link_p_ry = branch0_row_28 + hr_lower_leg_t16;
             p.set(4, 0, base_link_p_ry);
+            let branch0_row_30 = branches3_8[0];
+            let base_link_minus_p_rz = branch0_row_30 + hr_lower_leg_t17;
             p.set(5, 0, -base_link_minus_p_rz);
         }
     }
@@ -7648,7 +7940,7 @@ impl Solo12 {
     /// 1602 operations: 780 additions, 808 multiplications, 14 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn energy(&self, q: &[f64; 19], p: &[f64; 18]) -> [f64; 2] {
         let mut energy = [0.0; 2];
-        Self::energy_kernel::<::multibody::runtime::kernel::Plain, 1>(q, p, &mut energy);
+        ::multibody::runtime::kernel::call_exact::<Self, 3, _>((q, p, &mut energy,));
         energy
     }
 
@@ -7686,56 +7978,79 @@ impl Solo12 {
             angles[11][l] = hr_lower_leg_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 12>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 23]);
-        for l in 0..LANES { given[0][l] = q.get(2, l); }
-        for l in 0..LANES { given[1][l] = q.get(3, l); }
-        for l in 0..LANES { given[2][l] = q.get(4, l); }
-        for l in 0..LANES { given[3][l] = q.get(5, l); }
-        for l in 0..LANES { given[4][l] = q.get(6, l); }
-        for l in 0..LANES { given[5][l] = p.get(0, l); }
-        for l in 0..LANES { given[6][l] = p.get(1, l); }
-        for l in 0..LANES { given[7][l] = p.get(2, l); }
-        for l in 0..LANES { given[8][l] = p.get(3, l); }
-        for l in 0..LANES { given[9][l] = p.get(4, l); }
-        for l in 0..LANES { given[10][l] = p.get(5, l); }
-        for l in 0..LANES { given[11][l] = p.get(6, l); }
-        for l in 0..LANES { given[12][l] = p.get(7, l); }
-        for l in 0..LANES { given[13][l] = p.get(8, l); }
-        for l in 0..LANES { given[14][l] = p.get(9, l); }
-        for l in 0..LANES { given[15][l] = p.get(10, l); }
-        for l in 0..LANES { given[16][l] = p.get(11, l); }
-        for l in 0..LANES { given[17][l] = p.get(12, l); }
-        for l in 0..LANES { given[18][l] = p.get(13, l); }
-        for l in 0..LANES { given[19][l] = p.get(14, l); }
-        for l in 0..LANES { given[20][l] = p.get(15, l); }
-        for l in 0..LANES { given[21][l] = p.get(16, l); }
-        for l in 0..LANES { given[22][l] = p.get(17, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        let mut given_18 = [0.0; LANES];
+        let mut given_19 = [0.0; LANES];
+        let mut given_20 = [0.0; LANES];
+        let mut given_21 = [0.0; LANES];
+        let mut given_22 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(2, l); }
+        for l in 0..LANES { given_1[l] = q.get(3, l); }
+        for l in 0..LANES { given_2[l] = q.get(4, l); }
+        for l in 0..LANES { given_3[l] = q.get(5, l); }
+        for l in 0..LANES { given_4[l] = q.get(6, l); }
+        for l in 0..LANES { given_5[l] = p.get(0, l); }
+        for l in 0..LANES { given_6[l] = p.get(1, l); }
+        for l in 0..LANES { given_7[l] = p.get(2, l); }
+        for l in 0..LANES { given_8[l] = p.get(3, l); }
+        for l in 0..LANES { given_9[l] = p.get(4, l); }
+        for l in 0..LANES { given_10[l] = p.get(5, l); }
+        for l in 0..LANES { given_11[l] = p.get(6, l); }
+        for l in 0..LANES { given_12[l] = p.get(7, l); }
+        for l in 0..LANES { given_13[l] = p.get(8, l); }
+        for l in 0..LANES { given_14[l] = p.get(9, l); }
+        for l in 0..LANES { given_15[l] = p.get(10, l); }
+        for l in 0..LANES { given_16[l] = p.get(11, l); }
+        for l in 0..LANES { given_17[l] = p.get(12, l); }
+        for l in 0..LANES { given_18[l] = p.get(13, l); }
+        for l in 0..LANES { given_19[l] = p.get(14, l); }
+        for l in 0..LANES { given_20[l] = p.get(15, l); }
+        for l in 0..LANES { given_21[l] = p.get(16, l); }
+        for l in 0..LANES { given_22[l] = p.get(17, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
             let (q_2, p_0, p_1, p_2, p_3, p_4, p_5, p_6, p_7, p_8, p_9, p_10, p_11, p_12, p_13, p_14, p_15, p_16, p_17, base_link_t9, base_link_t10, base_link_t12, fl_shoulder_sin, fl_shoulder_cos, fr_shoulder_sin, fr_shoulder_cos, hl_shoulder_sin, hl_shoulder_cos, hr_shoulder_sin, hr_shoulder_cos, hr_lower_leg_t3, hr_lower_leg_t4, hr_lower_leg_t9, hr_lower_leg_t10, hr_upper_leg_m_rx_z, hr_lower_leg_t26, hr_upper_leg_t20, hr_upper_leg_t21, hr_upper_leg_t22, hr_upper_leg_t23, hr_upper_leg_t24, hr_upper_leg_minus_u_x, hr_upper_leg_u_y, hr_upper_leg_u_rx, hr_upper_leg_u_ry, hr_upper_leg_rho, hr_upper_leg_minus_k_x, hr_upper_leg_k_y, hr_upper_leg_k_rx, hr_upper_leg_k_ry, hr_upper_leg_minus_mp_ry_y, hr_shoulder_t16, hr_shoulder_minus_u_x, hr_shoulder_t18, hr_shoulder_u_y, hr_shoulder_u_rx, hr_shoulder_minus_u_ry, hr_shoulder_minus_rho, hr_shoulder_k_x, hr_shoulder_minus_k_y, hr_shoulder_k_z, hr_shoulder_minus_k_rx, hr_shoulder_k_ry, hl_lower_leg_t3, hl_lower_leg_t4, hl_lower_leg_t9, hl_lower_leg_t10, hl_upper_leg_m_rx_z, hl_lower_leg_t26, hl_upper_leg_t20, hl_upper_leg_t21, hl_upper_leg_t22, hl_upper_leg_t23, hl_upper_leg_t24, hl_upper_leg_minus_u_x, hl_upper_leg_u_y, hl_upper_leg_minus_u_rx, hl_upper_leg_minus_u_ry, hl_upper_leg_rho, hl_upper_leg_minus_k_x, hl_upper_leg_k_y, hl_upper_leg_minus_k_rx, hl_upper_leg_minus_k_ry, hl_upper_leg_mp_ry_y, hl_shoulder_t16, hl_shoulder_u_x, hl_shoulder_t18, hl_shoulder_minus_u_y, hl_shoulder_u_rx, hl_shoulder_minus_u_ry, hl_shoulder_minus_rho, hl_shoulder_minus_k_x, hl_shoulder_k_y, hl_shoulder_minus_k_z, hl_shoulder_minus_k_rx, hl_shoulder_k_ry, fr_lower_leg_t3, fr_lower_leg_t4, fr_lower_leg_t9, fr_lower_leg_t10, fr_upper_leg_m_rx_z, fr_lower_leg_t26, fr_upper_leg_t20, fr_upper_leg_t21, fr_upper_leg_t22, fr_upper_leg_t23, fr_upper_leg_t24, fr_upper_leg_minus_u_x, fr_upper_leg_u_y, fr_upper_leg_u_rx, fr_upper_leg_u_ry, fr_upper_leg_rho, fr_upper_leg_minus_k_x, fr_upper_leg_k_y, fr_upper_leg_k_rx, fr_upper_leg_k_ry, fr_upper_leg_minus_mp_ry_y, fr_shoulder_t16, fr_shoulder_minus_u_x, fr_shoulder_t18, fr_shoulder_u_y, fr_shoulder_u_rx, fr_shoulder_minus_u_ry, fr_shoulder_minus_rho, fr_shoulder_k_x, fr_shoulder_minus_k_y, fr_shoulder_k_z, fr_shoulder_minus_k_rx, fr_shoulder_k_ry, fr_shoulder_t94, fr_shoulder_t95, fr_shoulder_t96, fr_shoulder_t97, fr_shoulder_t98, fr_shoulder_t99, fr_shoulder_t100, fr_shoulder_t101, fr_shoulder_t102, fr_shoulder_t103, fr_shoulder_t104, fr_shoulder_t105, fr_shoulder_t106, fr_shoulder_t107, fr_shoulder_t108, fr_shoulder_t109, fr_shoulder_t110, fr_shoulder_t111, fr_shoulder_t112, fr_shoulder_t113, fr_shoulder_t114, fl_lower_leg_t3, fl_lower_leg_t4, fl_lower_leg_t9, fl_lower_leg_t10, fl_upper_leg_m_rx_z, fl_lower_leg_t26, fl_upper_leg_t20, fl_upper_leg_t21, fl_upper_leg_t22, fl_upper_leg_t23, fl_upper_leg_t24, fl_upper_leg_minus_u_x, fl_upper_leg_u_y, fl_upper_leg_minus_u_rx, fl_upper_leg_minus_u_ry, fl_upper_leg_rho, fl_upper_leg_minus_k_x, fl_upper_leg_k_y, fl_upper_leg_minus_k_rx, fl_upper_leg_minus_k_ry, fl_upper_leg_mp_ry_y, fl_shoulder_t16, fl_shoulder_u_x, fl_shoulder_t18, fl_shoulder_minus_u_y, fl_shoulder_u_rx, fl_shoulder_minus_u_ry, fl_shoulder_minus_rho, fl_shoulder_minus_k_x, fl_shoulder_k_y, fl_shoulder_minus_k_z, fl_shoulder_minus_k_rx, fl_shoulder_k_ry, fl_shoulder_minus_mp_xx, fl_shoulder_mp_xy, fl_shoulder_minus_mp_xz, fl_shoulder_minus_mp_rx_x, fl_shoulder_minus_mp_ry_x, fl_shoulder_minus_mp_yy, fl_shoulder_mp_yz, fl_shoulder_mp_rx_y, fl_shoulder_minus_mp_ry_y, fl_shoulder_minus_mp_zz, fl_shoulder_minus_mp_rx_z, fl_shoulder_mp_ry_z, fl_shoulder_mp_rx_rx, fl_shoulder_minus_mp_rx_ry, fl_shoulder_mp_ry_ry) = {
-                let q_2 = given[0][l];
-                let q_3 = given[1][l];
-                let q_4 = given[2][l];
-                let q_5 = given[3][l];
-                let q_6 = given[4][l];
-                let p_0 = given[5][l];
-                let p_1 = given[6][l];
-                let p_2 = given[7][l];
-                let p_3 = given[8][l];
-                let p_4 = given[9][l];
-                let p_5 = given[10][l];
-                let p_6 = given[11][l];
-                let p_7 = given[12][l];
-                let p_8 = given[13][l];
-                let p_9 = given[14][l];
-                let p_10 = given[15][l];
-                let p_11 = given[16][l];
-                let p_12 = given[17][l];
-                let p_13 = given[18][l];
-                let p_14 = given[19][l];
-                let p_15 = given[20][l];
-                let p_16 = given[21][l];
-                let p_17 = given[22][l];
+                let q_2 = given_0[l];
+                let q_3 = given_1[l];
+                let q_4 = given_2[l];
+                let q_5 = given_3[l];
+                let q_6 = given_4[l];
+                let p_0 = given_5[l];
+                let p_1 = given_6[l];
+                let p_2 = given_7[l];
+                let p_3 = given_8[l];
+                let p_4 = given_9[l];
+                let p_5 = given_10[l];
+                let p_6 = given_11[l];
+                let p_7 = given_12[l];
+                let p_8 = given_13[l];
+                let p_9 = given_14[l];
+                let p_10 = given_15[l];
+                let p_11 = given_16[l];
+                let p_12 = given_17[l];
+                let p_13 = given_18[l];
+                let p_14 = given_19[l];
+                let p_15 = given_20[l];
+                let p_16 = given_21[l];
+                let p_17 = given_22[l];
                 // base_link: sine and cosine, rotation
                 let base_link_t0 = q_3 + q_3;
                 let base_link_t1 = q_4 + q_4;
@@ -9435,16 +9750,16 @@ impl Solo12 {
                 let minus_energy_1 = 9.81 * base_link_t146;
                 (minus_energy_0, minus_energy_1)
             };
-            results[0][l] = -minus_energy_0;
-            results[1][l] = -minus_energy_1;
+            result_0[l] = -minus_energy_0;
+            result_1[l] = -minus_energy_1;
         }
-        energy.give_pair(0, [&results[0], &results[1]]);
+        energy.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
     /// 2426 operations: 1176 additions, 1236 multiplications, 14 divisions; apart: 0 square roots, 12 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 19], v: &[f64; 18], a: &mut [f64; 18]) {
-        Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, a);
+        ::multibody::runtime::kernel::call_exact::<Self, 4, _>((q, v, &self.tau, a,));
     }
 
     #[inline(always)]
@@ -9484,90 +9799,146 @@ impl Solo12 {
             angles[11][l] = hr_lower_leg_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 12>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 40]);
-        for l in 0..LANES { given[0][l] = q.get(3, l); }
-        for l in 0..LANES { given[1][l] = q.get(4, l); }
-        for l in 0..LANES { given[2][l] = q.get(5, l); }
-        for l in 0..LANES { given[3][l] = q.get(6, l); }
-        for l in 0..LANES { given[4][l] = v.get(0, l); }
-        for l in 0..LANES { given[5][l] = v.get(1, l); }
-        for l in 0..LANES { given[6][l] = v.get(2, l); }
-        for l in 0..LANES { given[7][l] = v.get(3, l); }
-        for l in 0..LANES { given[8][l] = v.get(4, l); }
-        for l in 0..LANES { given[9][l] = v.get(5, l); }
-        for l in 0..LANES { given[10][l] = v.get(6, l); }
-        for l in 0..LANES { given[11][l] = v.get(7, l); }
-        for l in 0..LANES { given[12][l] = v.get(8, l); }
-        for l in 0..LANES { given[13][l] = v.get(9, l); }
-        for l in 0..LANES { given[14][l] = v.get(10, l); }
-        for l in 0..LANES { given[15][l] = v.get(11, l); }
-        for l in 0..LANES { given[16][l] = v.get(12, l); }
-        for l in 0..LANES { given[17][l] = v.get(13, l); }
-        for l in 0..LANES { given[18][l] = v.get(14, l); }
-        for l in 0..LANES { given[19][l] = v.get(15, l); }
-        for l in 0..LANES { given[20][l] = v.get(16, l); }
-        for l in 0..LANES { given[21][l] = v.get(17, l); }
-        for l in 0..LANES { given[22][l] = tau.get(0, l); }
-        for l in 0..LANES { given[23][l] = tau.get(1, l); }
-        for l in 0..LANES { given[24][l] = tau.get(2, l); }
-        for l in 0..LANES { given[25][l] = tau.get(3, l); }
-        for l in 0..LANES { given[26][l] = tau.get(4, l); }
-        for l in 0..LANES { given[27][l] = tau.get(5, l); }
-        for l in 0..LANES { given[28][l] = tau.get(6, l); }
-        for l in 0..LANES { given[29][l] = tau.get(7, l); }
-        for l in 0..LANES { given[30][l] = tau.get(8, l); }
-        for l in 0..LANES { given[31][l] = tau.get(9, l); }
-        for l in 0..LANES { given[32][l] = tau.get(10, l); }
-        for l in 0..LANES { given[33][l] = tau.get(11, l); }
-        for l in 0..LANES { given[34][l] = tau.get(12, l); }
-        for l in 0..LANES { given[35][l] = tau.get(13, l); }
-        for l in 0..LANES { given[36][l] = tau.get(14, l); }
-        for l in 0..LANES { given[37][l] = tau.get(15, l); }
-        for l in 0..LANES { given[38][l] = tau.get(16, l); }
-        for l in 0..LANES { given[39][l] = tau.get(17, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 18]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        let mut given_18 = [0.0; LANES];
+        let mut given_19 = [0.0; LANES];
+        let mut given_20 = [0.0; LANES];
+        let mut given_21 = [0.0; LANES];
+        let mut given_22 = [0.0; LANES];
+        let mut given_23 = [0.0; LANES];
+        let mut given_24 = [0.0; LANES];
+        let mut given_25 = [0.0; LANES];
+        let mut given_26 = [0.0; LANES];
+        let mut given_27 = [0.0; LANES];
+        let mut given_28 = [0.0; LANES];
+        let mut given_29 = [0.0; LANES];
+        let mut given_30 = [0.0; LANES];
+        let mut given_31 = [0.0; LANES];
+        let mut given_32 = [0.0; LANES];
+        let mut given_33 = [0.0; LANES];
+        let mut given_34 = [0.0; LANES];
+        let mut given_35 = [0.0; LANES];
+        let mut given_36 = [0.0; LANES];
+        let mut given_37 = [0.0; LANES];
+        let mut given_38 = [0.0; LANES];
+        let mut given_39 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(3, l); }
+        for l in 0..LANES { given_1[l] = q.get(4, l); }
+        for l in 0..LANES { given_2[l] = q.get(5, l); }
+        for l in 0..LANES { given_3[l] = q.get(6, l); }
+        for l in 0..LANES { given_4[l] = v.get(0, l); }
+        for l in 0..LANES { given_5[l] = v.get(1, l); }
+        for l in 0..LANES { given_6[l] = v.get(2, l); }
+        for l in 0..LANES { given_7[l] = v.get(3, l); }
+        for l in 0..LANES { given_8[l] = v.get(4, l); }
+        for l in 0..LANES { given_9[l] = v.get(5, l); }
+        for l in 0..LANES { given_10[l] = v.get(6, l); }
+        for l in 0..LANES { given_11[l] = v.get(7, l); }
+        for l in 0..LANES { given_12[l] = v.get(8, l); }
+        for l in 0..LANES { given_13[l] = v.get(9, l); }
+        for l in 0..LANES { given_14[l] = v.get(10, l); }
+        for l in 0..LANES { given_15[l] = v.get(11, l); }
+        for l in 0..LANES { given_16[l] = v.get(12, l); }
+        for l in 0..LANES { given_17[l] = v.get(13, l); }
+        for l in 0..LANES { given_18[l] = v.get(14, l); }
+        for l in 0..LANES { given_19[l] = v.get(15, l); }
+        for l in 0..LANES { given_20[l] = v.get(16, l); }
+        for l in 0..LANES { given_21[l] = v.get(17, l); }
+        for l in 0..LANES { given_22[l] = tau.get(0, l); }
+        for l in 0..LANES { given_23[l] = tau.get(1, l); }
+        for l in 0..LANES { given_24[l] = tau.get(2, l); }
+        for l in 0..LANES { given_25[l] = tau.get(3, l); }
+        for l in 0..LANES { given_26[l] = tau.get(4, l); }
+        for l in 0..LANES { given_27[l] = tau.get(5, l); }
+        for l in 0..LANES { given_28[l] = tau.get(6, l); }
+        for l in 0..LANES { given_29[l] = tau.get(7, l); }
+        for l in 0..LANES { given_30[l] = tau.get(8, l); }
+        for l in 0..LANES { given_31[l] = tau.get(9, l); }
+        for l in 0..LANES { given_32[l] = tau.get(10, l); }
+        for l in 0..LANES { given_33[l] = tau.get(11, l); }
+        for l in 0..LANES { given_34[l] = tau.get(12, l); }
+        for l in 0..LANES { given_35[l] = tau.get(13, l); }
+        for l in 0..LANES { given_36[l] = tau.get(14, l); }
+        for l in 0..LANES { given_37[l] = tau.get(15, l); }
+        for l in 0..LANES { given_38[l] = tau.get(16, l); }
+        for l in 0..LANES { given_39[l] = tau.get(17, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
         for l in 0..LANES {
             let (v_0, v_1, v_2, v_3, v_4, v_5, v_6, v_7, v_8, v_9, v_10, v_11, v_12, v_13, v_14, v_15, v_16, v_17, tau_0, tau_1, tau_2, tau_3, tau_4, tau_5, tau_6, tau_7, tau_8, tau_9, tau_10, tau_11, tau_12, tau_13, tau_14, tau_15, tau_16, tau_17, base_link_t9, base_link_t10, base_link_t12, fl_shoulder_sin, fl_shoulder_cos, fl_upper_leg_t2, fl_upper_leg_t5, fl_upper_leg_t10, fl_upper_leg_t12, fl_upper_leg_t13, fl_upper_leg_t16, fl_upper_leg_t19, fl_lower_leg_t1, fl_lower_leg_t2, fl_lower_leg_sin, fl_lower_leg_cos, fr_shoulder_sin, fr_shoulder_cos, fr_upper_leg_t2, fr_upper_leg_t5, fr_upper_leg_t10, fr_upper_leg_t12, fr_upper_leg_t13, fr_upper_leg_t16, fr_upper_leg_t19, fr_lower_leg_t1, fr_lower_leg_t2, fr_lower_leg_sin, fr_lower_leg_cos, hl_shoulder_sin, hl_shoulder_cos, hl_upper_leg_t2, hl_upper_leg_t5, hl_upper_leg_t10, hl_upper_leg_t12, hl_upper_leg_t13, hl_upper_leg_t16, hl_upper_leg_t19, hl_lower_leg_t1, hl_lower_leg_t2, hl_lower_leg_sin, hl_lower_leg_cos, hr_shoulder_sin, hr_shoulder_cos, hr_upper_leg_t2, hr_upper_leg_t5, hr_upper_leg_t10, hr_upper_leg_t12, hr_upper_leg_t13, hr_upper_leg_t16, hr_upper_leg_t19, hr_lower_leg_t1, hr_lower_leg_t2, hr_lower_leg_sin, hr_lower_leg_cos, hr_lower_leg_t3, hr_lower_leg_t4, hr_lower_leg_t9, hr_lower_leg_t10, hr_lower_leg_t26, hr_upper_leg_t20, hr_upper_leg_t21, hr_upper_leg_t22, hr_upper_leg_t23, hr_upper_leg_t24, hr_upper_leg_minus_u_x, hr_upper_leg_u_y, hr_upper_leg_u_rx, hr_upper_leg_u_ry, hr_upper_leg_rho, hr_upper_leg_minus_k_x, hr_upper_leg_k_y, hr_upper_leg_k_rx, hr_upper_leg_k_ry, hr_upper_leg_minus_mp_ry_y, hr_shoulder_minus_u_x, hr_shoulder_u_y, hr_shoulder_u_rx, hr_shoulder_minus_u_ry, hr_shoulder_minus_rho, hr_shoulder_k_x, hr_shoulder_minus_k_y, hr_shoulder_k_z, hr_shoulder_minus_k_rx, hr_shoulder_k_ry, hl_lower_leg_t3, hl_lower_leg_t4, hl_lower_leg_t9, hl_lower_leg_t10, hl_lower_leg_t26, hl_upper_leg_t20, hl_upper_leg_t21, hl_upper_leg_t22, hl_upper_leg_t23, hl_upper_leg_t24, hl_upper_leg_minus_u_x, hl_upper_leg_u_y, hl_upper_leg_minus_u_rx, hl_upper_leg_minus_u_ry, hl_upper_leg_rho, hl_upper_leg_minus_k_x, hl_upper_leg_k_y, hl_upper_leg_minus_k_rx, hl_upper_leg_minus_k_ry, hl_upper_leg_mp_ry_y, hl_shoulder_u_x, hl_shoulder_minus_u_y, hl_shoulder_u_rx, hl_shoulder_minus_u_ry, hl_shoulder_minus_rho, hl_shoulder_minus_k_x, hl_shoulder_k_y, hl_shoulder_minus_k_z, hl_shoulder_minus_k_rx, hl_shoulder_k_ry, fr_lower_leg_t3, fr_lower_leg_t4, fr_lower_leg_t9, fr_lower_leg_t10, fr_lower_leg_t26, fr_upper_leg_t20, fr_upper_leg_t21, fr_upper_leg_t22, fr_upper_leg_t23, fr_upper_leg_t24, fr_upper_leg_minus_u_x, fr_upper_leg_u_y, fr_upper_leg_u_rx, fr_upper_leg_u_ry, fr_upper_leg_rho, fr_upper_leg_minus_k_x, fr_upper_leg_k_y, fr_upper_leg_k_rx, fr_upper_leg_k_ry, fr_upper_leg_minus_mp_ry_y, fr_shoulder_minus_u_x, fr_shoulder_u_y, fr_shoulder_u_rx, fr_shoulder_minus_u_ry, fr_shoulder_minus_rho, fr_shoulder_k_x, fr_shoulder_minus_k_y, fr_shoulder_k_z, fr_shoulder_minus_k_rx, fr_shoulder_k_ry, fr_shoulder_t94, fr_shoulder_t95, fr_shoulder_t96, fr_shoulder_t97, fr_shoulder_t98, fr_shoulder_t99, fr_shoulder_t100, fr_shoulder_t101, fr_shoulder_t102, fr_shoulder_t103, fr_shoulder_t104, fr_shoulder_t105, fr_shoulder_t106, fr_shoulder_t107, fr_shoulder_t108, fr_shoulder_t109, fr_shoulder_t110, fr_shoulder_t111, fr_shoulder_t112, fr_shoulder_t113, fr_shoulder_t114, fl_lower_leg_t3, fl_lower_leg_t4, fl_lower_leg_t9, fl_lower_leg_t10, fl_lower_leg_t26, fl_upper_leg_t20, fl_upper_leg_t21, fl_upper_leg_t22, fl_upper_leg_t23, fl_upper_leg_t24, fl_upper_leg_minus_u_x, fl_upper_leg_u_y, fl_upper_leg_minus_u_rx, fl_upper_leg_minus_u_ry, fl_upper_leg_rho, fl_upper_leg_minus_k_x, fl_upper_leg_k_y, fl_upper_leg_minus_k_rx, fl_upper_leg_minus_k_ry, fl_upper_leg_minus_mp_yy, fl_upper_leg_mp_ry_y, fl_shoulder_t5, fl_shoulder_u_x, fl_shoulder_minus_u_y, fl_shoulder_t34, fl_shoulder_t35, fl_shoulder_t37, fl_shoulder_t39, fl_shoulder_u_rx, fl_shoulder_minus_u_ry, fl_shoulder_t44, fl_shoulder_t47, fl_shoulder_t50, fl_shoulder_minus_rho, fl_shoulder_minus_k_x, fl_shoulder_k_y, fl_shoulder_minus_k_z, fl_shoulder_minus_k_rx, fl_shoulder_k_ry, fl_shoulder_minus_mp_xx, fl_shoulder_mp_xy, fl_shoulder_minus_mp_xz, fl_shoulder_minus_mp_rx_x, fl_shoulder_minus_mp_ry_x, fl_shoulder_minus_mp_yy, fl_shoulder_t57) = {
-                let q_3 = given[0][l];
-                let q_4 = given[1][l];
-                let q_5 = given[2][l];
-                let q_6 = given[3][l];
-                let v_0 = given[4][l];
-                let v_1 = given[5][l];
-                let v_2 = given[6][l];
-                let v_3 = given[7][l];
-                let v_4 = given[8][l];
-                let v_5 = given[9][l];
-                let v_6 = given[10][l];
-                let v_7 = given[11][l];
-                let v_8 = given[12][l];
-                let v_9 = given[13][l];
-                let v_10 = given[14][l];
-                let v_11 = given[15][l];
-                let v_12 = given[16][l];
-                let v_13 = given[17][l];
-                let v_14 = given[18][l];
-                let v_15 = given[19][l];
-                let v_16 = given[20][l];
-                let v_17 = given[21][l];
-                let tau_0 = given[22][l];
-                let tau_1 = given[23][l];
-                let tau_2 = given[24][l];
-                let tau_3 = given[25][l];
-                let tau_4 = given[26][l];
-                let tau_5 = given[27][l];
-                let tau_6 = given[28][l];
-                let tau_7 = given[29][l];
-                let tau_8 = given[30][l];
-                let tau_9 = given[31][l];
-                let tau_10 = given[32][l];
-                let tau_11 = given[33][l];
-                let tau_12 = given[34][l];
-                let tau_13 = given[35][l];
-                let tau_14 = given[36][l];
-                let tau_15 = given[37][l];
-                let tau_16 = given[38][l];
-                let tau_17 = given[39][l];
+                let q_3 = given_0[l];
+                let q_4 = given_1[l];
+                let q_5 = given_2[l];
+                let q_6 = given_3[l];
+                let v_0 = given_4[l];
+                let v_1 = given_5[l];
+                let v_2 = given_6[l];
+                let v_3 = given_7[l];
+                let v_4 = given_8[l];
+                let v_5 = given_9[l];
+                let v_6 = given_10[l];
+                let v_7 = given_11[l];
+                let v_8 = given_12[l];
+                let v_9 = given_13[l];
+                let v_10 = given_14[l];
+                let v_11 = given_15[l];
+                let v_12 = given_16[l];
+                let v_13 = given_17[l];
+                let v_14 = given_18[l];
+                let v_15 = given_19[l];
+                let v_16 = given_20[l];
+                let v_17 = given_21[l];
+                let tau_0 = given_22[l];
+                let tau_1 = given_23[l];
+                let tau_2 = given_24[l];
+                let tau_3 = given_25[l];
+                let tau_4 = given_26[l];
+                let tau_5 = given_27[l];
+                let tau_6 = given_28[l];
+                let tau_7 = given_29[l];
+                let tau_8 = given_30[l];
+                let tau_9 = given_31[l];
+                let tau_10 = given_32[l];
+                let tau_11 = given_33[l];
+                let tau_12 = given_34[l];
+                let tau_13 = given_35[l];
+                let tau_14 = given_36[l];
+                let tau_15 = given_37[l];
+                let tau_16 = given_38[l];
+                let tau_17 = given_39[l];
                 // base_link: sine and cosine, rotation
                 let base_link_t0 = q_3 + q_3;
                 let base_link_t1 = q_4 + q_4;
@@ -12128,34 +12499,34 @@ impl Solo12 {
                 let a_16 = hr_shoulder_minus_alpha_y - hr_upper_leg_minus_a;
                 (base_link_e_2, base_link_minus_a, base_link_a, fl_shoulder_minus_a, fl_lower_leg_a, fr_shoulder_minus_a, fr_lower_leg_a, hl_shoulder_minus_a, hl_lower_leg_a, hr_shoulder_minus_a, hr_lower_leg_a, minus_a_0, minus_a_1, a_2, a_7, a_10, a_13, a_16)
             };
-            results[0][l] = -minus_a_0;
-            results[1][l] = -minus_a_1;
-            results[2][l] = a_2;
-            results[3][l] = base_link_a;
-            results[4][l] = -base_link_minus_a;
-            results[5][l] = base_link_e_2;
-            results[6][l] = -fl_shoulder_minus_a;
-            results[7][l] = a_7;
-            results[8][l] = fl_lower_leg_a;
-            results[9][l] = -fr_shoulder_minus_a;
-            results[10][l] = a_10;
-            results[11][l] = fr_lower_leg_a;
-            results[12][l] = -hl_shoulder_minus_a;
-            results[13][l] = a_13;
-            results[14][l] = hl_lower_leg_a;
-            results[15][l] = -hr_shoulder_minus_a;
-            results[16][l] = a_16;
-            results[17][l] = hr_lower_leg_a;
+            result_0[l] = -minus_a_0;
+            result_1[l] = -minus_a_1;
+            result_2[l] = a_2;
+            result_3[l] = base_link_a;
+            result_4[l] = -base_link_minus_a;
+            result_5[l] = base_link_e_2;
+            result_6[l] = -fl_shoulder_minus_a;
+            result_7[l] = a_7;
+            result_8[l] = fl_lower_leg_a;
+            result_9[l] = -fr_shoulder_minus_a;
+            result_10[l] = a_10;
+            result_11[l] = fr_lower_leg_a;
+            result_12[l] = -hl_shoulder_minus_a;
+            result_13[l] = a_13;
+            result_14[l] = hl_lower_leg_a;
+            result_15[l] = -hr_shoulder_minus_a;
+            result_16[l] = a_16;
+            result_17[l] = hr_lower_leg_a;
         }
-        a.give_pair(0, [&results[0], &results[1]]);
-        a.give_pair(2, [&results[2], &results[3]]);
-        a.give_pair(4, [&results[4], &results[5]]);
-        a.give_pair(6, [&results[6], &results[7]]);
-        a.give_pair(8, [&results[8], &results[9]]);
-        a.give_pair(10, [&results[10], &results[11]]);
-        a.give_pair(12, [&results[12], &results[13]]);
-        a.give_pair(14, [&results[14], &results[15]]);
-        a.give_pair(16, [&results[16], &results[17]]);
+        a.give_pair(0, [&result_0, &result_1]);
+        a.give_pair(2, [&result_2, &result_3]);
+        a.give_pair(4, [&result_4, &result_5]);
+        a.give_pair(6, [&result_6, &result_7]);
+        a.give_pair(8, [&result_8, &result_9]);
+        a.give_pair(10, [&result_10, &result_11]);
+        a.give_pair(12, [&result_12, &result_13]);
+        a.give_pair(14, [&result_14, &result_15]);
+        a.give_pair(16, [&result_16, &result_17]);
     }
 
     /// One state: like branches at the same time, in the lanes of vector registers.
@@ -12219,23 +12590,50 @@ impl Solo12 {
             let base_link_t23 = v_0 * v_4;
             let base_link_t24 = base_link_t22 - base_link_t23;
             let base_link_t25 = base_link_t13 + base_link_t18;
+            kept[0] = base_link_t25;
             let base_link_t26 = base_link_t14 + base_link_t21;
+            kept[1] = base_link_t26;
             let base_link_t27 = base_link_t15 - base_link_t24;
+            kept[2] = base_link_t27;
             // base_link: gravity and wrenches
             let base_link_t28 = v_3 * v_4;
             let base_link_t29 = v_3 * v_5;
             let base_link_t30 = v_4 * v_5;
             let base_link_f_rx = 0.015630744706250005 * base_link_t30;
-            let base_link_minus_f_ry = 0.05680450180454846 * base_link_t29;
-            let base_link_f_rz = 0.04117375709829846 * base_link_t28;
-            kept[0] = base_link_t25;
-            kept[1] = base_link_t26;
-            kept[2] = base_link_t27;
             kept[3] = base_link_f_rx;
+            let base_link_minus_f_ry = 0.05680450180454846 * base_link_t29;
             kept[4] = base_link_minus_f_ry;
+            let base_link_f_rz = 0.04117375709829846 * base_link_t28;
             kept[5] = base_link_f_rz;
         }
-        let mut branches2 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 28]);
+        let mut branches2_0 = [0.0; LANES];
+        let mut branches2_1 = [0.0; LANES];
+        let mut branches2_2 = [0.0; LANES];
+        let mut branches2_3 = [0.0; LANES];
+        let mut branches2_4 = [0.0; LANES];
+        let mut branches2_5 = [0.0; LANES];
+        let mut branches2_6 = [0.0; LANES];
+        let mut branches2_7 = [0.0; LANES];
+        let mut branches2_8 = [0.0; LANES];
+        let mut branches2_9 = [0.0; LANES];
+        let mut branches2_10 = [0.0; LANES];
+        let mut branches2_11 = [0.0; LANES];
+        let mut branches2_12 = [0.0; LANES];
+        let mut branches2_13 = [0.0; LANES];
+        let mut branches2_14 = [0.0; LANES];
+        let mut branches2_15 = [0.0; LANES];
+        let mut branches2_16 = [0.0; LANES];
+        let mut branches2_17 = [0.0; LANES];
+        let mut branches2_18 = [0.0; LANES];
+        let mut branches2_19 = [0.0; LANES];
+        let mut branches2_20 = [0.0; LANES];
+        let mut branches2_21 = [0.0; LANES];
+        let mut branches2_22 = [0.0; LANES];
+        let mut branches2_23 = [0.0; LANES];
+        let mut branches2_24 = [0.0; LANES];
+        let mut branches2_25 = [0.0; LANES];
+        let mut branches2_26 = [0.0; LANES];
+        let mut branches2_27 = [0.0; LANES];
         {
             let given11 = [v.get(6, 0), v.get(9, 0), v.get(12, 0), v.get(15, 0)];
             let given15 = [v.get(7, 0), v.get(10, 0), v.get(13, 0), v.get(16, 0)];
@@ -12248,27 +12646,36 @@ impl Solo12 {
                 let row_2 = sines[1][k];
                 let fl_upper_leg_t1 = table_4 * row_2;
                 let fl_upper_leg_t2 = fl_upper_leg_t0 - fl_upper_leg_t1;
+                branches2_0[k] = fl_upper_leg_t2;
                 let fl_upper_leg_t3 = 0.01771278698415 * row_2;
                 let fl_upper_leg_t4 = table_4 * row_3;
                 let fl_upper_leg_t5 = fl_upper_leg_t3 + fl_upper_leg_t4;
+                branches2_1[k] = fl_upper_leg_t5;
                 let fl_upper_leg_t6 = 0.0022644781431582876 * row_2;
                 let fl_upper_leg_t7 = row_3 + row_3;
                 let table_5 = table[5][k];
                 let fl_upper_leg_t8 = table_5 * fl_upper_leg_t7;
                 let fl_upper_leg_t9 = fl_upper_leg_t6 - fl_upper_leg_t8;
                 let fl_upper_leg_t10 = row_2 * fl_upper_leg_t9;
+                branches2_2[k] = fl_upper_leg_t10;
                 let fl_upper_leg_t11 = row_3 * fl_upper_leg_t9;
                 let fl_upper_leg_t12 = table_5 + fl_upper_leg_t11;
+                branches2_3[k] = fl_upper_leg_t12;
                 let fl_upper_leg_t13 = fl_upper_leg_t10 - 0.0022644781431582876;
+                branches2_4[k] = fl_upper_leg_t13;
                 let table_6 = table[6][k];
                 let fl_upper_leg_t14 = table_6 * row_3;
                 let fl_upper_leg_t15 = 6.823068516838894e-8 * row_2;
                 let fl_upper_leg_t16 = fl_upper_leg_t14 - fl_upper_leg_t15;
+                branches2_5[k] = fl_upper_leg_t16;
                 let fl_upper_leg_t17 = table_6 * row_2;
                 let fl_upper_leg_t18 = 6.823068516838894e-8 * row_3;
                 let fl_upper_leg_t19 = fl_upper_leg_t17 + fl_upper_leg_t18;
+                branches2_6[k] = fl_upper_leg_t19;
                 let fl_lower_leg_t0 = 0.16 * row_3;
+                branches2_7[k] = fl_lower_leg_t0;
                 let fl_lower_leg_t1 = 0.16 * row_2;
+                branches2_8[k] = fl_lower_leg_t1;
                 let carried_0 = v.get(3, 0);
                 let carried_1 = v.get(4, 0);
                 let fl_shoulder_t0 = carried_0 * carried_1;
@@ -12299,6 +12706,7 @@ impl Solo12 {
                 let fl_shoulder_spin_z = v_6 + carried_0;
                 let fl_shoulder_alpha_x = v_6 * fl_shoulder_spin_y;
                 let fl_shoulder_minus_alpha_y = v_6 * fl_shoulder_spin_x;
+                branches2_9[k] = fl_shoulder_minus_alpha_y;
                 let fl_shoulder_t18 = fl_shoulder_spin_x * fl_shoulder_spin_z;
                 let fl_shoulder_t19 = fl_shoulder_minus_alpha_y - fl_shoulder_t18;
                 let fl_shoulder_t20 = fl_shoulder_spin_y * fl_shoulder_spin_z;
@@ -12319,8 +12727,11 @@ impl Solo12 {
                 let fl_shoulder_t31 = fl_shoulder_alpha_x + fl_shoulder_t20;
                 let table_2 = table[2][k];
                 let fl_shoulder_f_x = table_2 * fl_shoulder_t29;
+                branches2_10[k] = fl_shoulder_f_x;
                 let fl_shoulder_minus_f_y = table_2 * fl_shoulder_t30;
+                branches2_11[k] = fl_shoulder_minus_f_y;
                 let fl_shoulder_f_z = table_2 * fl_shoulder_t31;
+                branches2_12[k] = fl_shoulder_f_z;
                 let fl_shoulder_t32 = 0.003148870268177617 * fl_shoulder_alpha_x;
                 let fl_shoulder_t33 = 0.003179970268177617 * fl_shoulder_t20;
                 let fl_shoulder_t34 = fl_shoulder_t32 + fl_shoulder_t33;
@@ -12331,6 +12742,7 @@ impl Solo12 {
                 let fl_shoulder_t38 = 3.110000000000005e-5 * fl_shoulder_t18;
                 let fl_shoulder_t39 = table_3 * fl_shoulder_t29;
                 let fl_shoulder_minus_f_ry = fl_shoulder_t38 + fl_shoulder_t39;
+                branches2_13[k] = fl_shoulder_minus_f_ry;
                 let fl_shoulder_t40 = fl_shoulder_t22 - fl_shoulder_t28;
                 let fl_shoulder_t41 = 0.003148870268177617 * fl_shoulder_t29;
                 let fl_shoulder_t42 = table_3 * fl_shoulder_t19;
@@ -12338,7 +12750,9 @@ impl Solo12 {
                 let fl_shoulder_t44 = table_2 * fl_shoulder_accel_z;
                 let fl_shoulder_t45 = table_2 * fl_shoulder_minus_accel_x;
                 let fl_shoulder_f_rx = fl_shoulder_t37 + fl_shoulder_t44;
+                branches2_14[k] = fl_shoulder_f_rx;
                 let fl_shoulder_minus_f_rz = fl_shoulder_t43 - fl_shoulder_t45;
+                branches2_15[k] = fl_shoulder_minus_f_rz;
                 let v_7 = given15[k];
                 let fl_upper_leg_spin_z = v_7 + fl_shoulder_spin_y;
                 let fl_upper_leg_t20 = v_7 * fl_shoulder_spin_z;
@@ -12356,12 +12770,15 @@ impl Solo12 {
                 let fl_upper_leg_t30 = fl_upper_leg_t2 * fl_upper_leg_t26;
                 let fl_upper_leg_t31 = fl_upper_leg_t5 * fl_shoulder_t18;
                 let fl_upper_leg_minus_f_x = fl_upper_leg_t30 + fl_upper_leg_t31;
+                branches2_16[k] = fl_upper_leg_minus_f_x;
                 let fl_upper_leg_t32 = fl_upper_leg_t2 * fl_shoulder_t18;
                 let fl_upper_leg_t33 = fl_upper_leg_t5 * fl_upper_leg_t27;
                 let fl_upper_leg_minus_f_y = fl_upper_leg_t32 + fl_upper_leg_t33;
+                branches2_17[k] = fl_upper_leg_minus_f_y;
                 let fl_upper_leg_t34 = fl_upper_leg_t2 * fl_upper_leg_t28;
                 let fl_upper_leg_t35 = fl_upper_leg_t5 * fl_upper_leg_t29;
                 let fl_upper_leg_f_z = fl_upper_leg_t34 + fl_upper_leg_t35;
+                branches2_18[k] = fl_upper_leg_f_z;
                 let fl_upper_leg_t36 = fl_upper_leg_t13 * fl_upper_leg_alpha_x;
                 let fl_upper_leg_t37 = fl_upper_leg_t10 + 0.0022955781994879005;
                 let fl_upper_leg_t38 = fl_upper_leg_t23 * fl_upper_leg_t37;
@@ -12398,8 +12815,11 @@ impl Solo12 {
                 let fl_upper_leg_t69 = fl_upper_leg_t5 * fl_shoulder_minus_accel_x;
                 let fl_upper_leg_t70 = fl_upper_leg_t68 - fl_upper_leg_t69;
                 let fl_upper_leg_f_rx = fl_upper_leg_t46 + fl_upper_leg_t66;
+                branches2_19[k] = fl_upper_leg_f_rx;
                 let fl_upper_leg_f_ry = fl_upper_leg_t57 - fl_upper_leg_t67;
+                branches2_20[k] = fl_upper_leg_f_ry;
                 let fl_upper_leg_f_rz = fl_upper_leg_t65 - fl_upper_leg_t70;
+                branches2_21[k] = fl_upper_leg_f_rz;
                 let fl_lower_leg_t2 = fl_lower_leg_t0 * fl_shoulder_t18;
                 let fl_lower_leg_t3 = fl_shoulder_accel_z + fl_lower_leg_t2;
                 let fl_lower_leg_t4 = fl_lower_leg_t0 * fl_upper_leg_t28;
@@ -12445,14 +12865,18 @@ impl Solo12 {
                 let fl_lower_leg_t34 = fl_lower_leg_t31 + fl_lower_leg_t32;
                 let fl_lower_leg_t35 = fl_lower_leg_minus_alpha_y + fl_lower_leg_t27;
                 let fl_lower_leg_minus_f_x = 0.0038482516772413004 * fl_lower_leg_t34;
+                branches2_22[k] = fl_lower_leg_minus_f_x;
                 let fl_lower_leg_minus_f_y = 0.0038482516772413004 * fl_lower_leg_t33;
+                branches2_23[k] = fl_lower_leg_minus_f_y;
                 let fl_lower_leg_f_z = 0.0038482516772413004 * fl_lower_leg_t35;
+                branches2_24[k] = fl_lower_leg_f_z;
                 let fl_lower_leg_t36 = 0.0005396092213171668 * fl_lower_leg_alpha_x;
                 let fl_lower_leg_t37 = 0.0005426192213171668 * fl_lower_leg_t28;
                 let fl_lower_leg_t38 = fl_lower_leg_t36 + fl_lower_leg_t37;
                 let table_7 = table[7][k];
                 let fl_lower_leg_t39 = table_7 * fl_lower_leg_t33;
                 let fl_lower_leg_minus_f_rx = fl_lower_leg_t38 + fl_lower_leg_t39;
+                branches2_25[k] = fl_lower_leg_minus_f_rx;
                 let fl_lower_leg_t40 = 0.0010822284426343334 * fl_lower_leg_t27;
                 let fl_lower_leg_t41 = fl_lower_leg_t30 - fl_lower_leg_t32;
                 let fl_lower_leg_t42 = table_7 * fl_lower_leg_t41;
@@ -12463,38 +12887,55 @@ impl Solo12 {
                 let fl_lower_leg_t47 = 0.0038482516772413004 * fl_lower_leg_accel_z;
                 let fl_lower_leg_t48 = 0.0038482516772413004 * fl_lower_leg_minus_accel_y;
                 let fl_lower_leg_minus_f_ry = fl_lower_leg_t43 + fl_lower_leg_t47;
+                branches2_26[k] = fl_lower_leg_minus_f_ry;
                 let fl_lower_leg_minus_f_rz = fl_lower_leg_t46 + fl_lower_leg_t48;
-                branches2[0][k] = fl_upper_leg_t2;
-                branches2[1][k] = fl_upper_leg_t5;
-                branches2[2][k] = fl_upper_leg_t10;
-                branches2[3][k] = fl_upper_leg_t12;
-                branches2[4][k] = fl_upper_leg_t13;
-                branches2[5][k] = fl_upper_leg_t16;
-                branches2[6][k] = fl_upper_leg_t19;
-                branches2[7][k] = fl_lower_leg_t0;
-                branches2[8][k] = fl_lower_leg_t1;
-                branches2[9][k] = fl_shoulder_minus_alpha_y;
-                branches2[10][k] = fl_shoulder_f_x;
-                branches2[11][k] = fl_shoulder_minus_f_y;
-                branches2[12][k] = fl_shoulder_f_z;
-                branches2[13][k] = fl_shoulder_minus_f_ry;
-                branches2[14][k] = fl_shoulder_f_rx;
-                branches2[15][k] = fl_shoulder_minus_f_rz;
-                branches2[16][k] = fl_upper_leg_minus_f_x;
-                branches2[17][k] = fl_upper_leg_minus_f_y;
-                branches2[18][k] = fl_upper_leg_f_z;
-                branches2[19][k] = fl_upper_leg_f_rx;
-                branches2[20][k] = fl_upper_leg_f_ry;
-                branches2[21][k] = fl_upper_leg_f_rz;
-                branches2[22][k] = fl_lower_leg_minus_f_x;
-                branches2[23][k] = fl_lower_leg_minus_f_y;
-                branches2[24][k] = fl_lower_leg_f_z;
-                branches2[25][k] = fl_lower_leg_minus_f_rx;
-                branches2[26][k] = fl_lower_leg_minus_f_ry;
-                branches2[27][k] = fl_lower_leg_minus_f_rz;
+                branches2_27[k] = fl_lower_leg_minus_f_rz;
             }
         }
-        let mut branches3 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 44]);
+        let mut branches3_0 = [0.0; LANES];
+        let mut branches3_1 = [0.0; LANES];
+        let mut branches3_2 = [0.0; LANES];
+        let mut branches3_3 = [0.0; LANES];
+        let mut branches3_4 = [0.0; LANES];
+        let mut branches3_5 = [0.0; LANES];
+        let mut branches3_6 = [0.0; LANES];
+        let mut branches3_7 = [0.0; LANES];
+        let mut branches3_8 = [0.0; LANES];
+        let mut branches3_9 = [0.0; LANES];
+        let mut branches3_10 = [0.0; LANES];
+        let mut branches3_11 = [0.0; LANES];
+        let mut branches3_12 = [0.0; LANES];
+        let mut branches3_13 = [0.0; LANES];
+        let mut branches3_14 = [0.0; LANES];
+        let mut branches3_15 = [0.0; LANES];
+        let mut branches3_16 = [0.0; LANES];
+        let mut branches3_17 = [0.0; LANES];
+        let mut branches3_18 = [0.0; LANES];
+        let mut branches3_19 = [0.0; LANES];
+        let mut branches3_20 = [0.0; LANES];
+        let mut branches3_21 = [0.0; LANES];
+        let mut branches3_22 = [0.0; LANES];
+        let mut branches3_23 = [0.0; LANES];
+        let mut branches3_24 = [0.0; LANES];
+        let mut branches3_25 = [0.0; LANES];
+        let mut branches3_26 = [0.0; LANES];
+        let mut branches3_27 = [0.0; LANES];
+        let mut branches3_28 = [0.0; LANES];
+        let mut branches3_29 = [0.0; LANES];
+        let mut branches3_30 = [0.0; LANES];
+        let mut branches3_31 = [0.0; LANES];
+        let mut branches3_32 = [0.0; LANES];
+        let mut branches3_33 = [0.0; LANES];
+        let mut branches3_34 = [0.0; LANES];
+        let mut branches3_35 = [0.0; LANES];
+        let mut branches3_36 = [0.0; LANES];
+        let mut branches3_37 = [0.0; LANES];
+        let mut branches3_38 = [0.0; LANES];
+        let mut branches3_39 = [0.0; LANES];
+        let mut branches3_40 = [0.0; LANES];
+        let mut branches3_41 = [0.0; LANES];
+        let mut branches3_42 = [0.0; LANES];
+        let mut branches3_43 = [0.0; LANES];
         {
             let given25 = [tau.get(8, 0), tau.get(11, 0), tau.get(14, 0), tau.get(17, 0)];
             let given26 = [tau.get(7, 0), tau.get(10, 0), tau.get(13, 0), tau.get(16, 0)];
@@ -12512,82 +12953,87 @@ impl Solo12 {
                 let table_7 = table[7][k];
                 let fl_lower_leg_t6 = table_7 * row_14;
                 let fl_lower_leg_t7 = table_7 * row_13;
-                let row_12 = branches2[8][k];
+                let row_12 = branches2_8[k];
                 let fl_lower_leg_t8 = row_12 * fl_lower_leg_t1;
                 let fl_lower_leg_t9 = fl_lower_leg_t4 + fl_lower_leg_t8;
                 let fl_lower_leg_t10 = fl_lower_leg_t0 + fl_lower_leg_t0;
                 let fl_lower_leg_t11 = row_12 * fl_lower_leg_t10;
                 let fl_lower_leg_t12 = fl_lower_leg_t11 + 0.0005426192213171668;
                 let fl_lower_leg_t13 = fl_lower_leg_t5 + fl_lower_leg_t11;
-                let row_11 = branches2[7][k];
+                let row_11 = branches2_7[k];
                 let fl_lower_leg_t14 = row_11 * fl_lower_leg_t0;
                 let fl_lower_leg_t15 = fl_lower_leg_t9 + fl_lower_leg_t14;
                 let fl_lower_leg_t16 = fl_lower_leg_t1 + fl_lower_leg_t1;
                 let fl_lower_leg_t17 = row_11 * fl_lower_leg_t16;
                 let fl_lower_leg_t18 = fl_lower_leg_t3 - fl_lower_leg_t17;
                 let fl_lower_leg_t19 = fl_lower_leg_t12 + fl_lower_leg_t17;
-                let row_5 = branches2[1][k];
+                let row_5 = branches2_1[k];
                 let fl_upper_leg_m_rx_z = row_5 + fl_lower_leg_t0;
-                let row_4 = branches2[0][k];
+                let row_4 = branches2_0[k];
                 let fl_upper_leg_minus_m_ry_z = row_4 + fl_lower_leg_t1;
-                let row_8 = branches2[4][k];
+                let row_8 = branches2_4[k];
                 let fl_upper_leg_m_rx_rx = row_8 + fl_lower_leg_t13;
-                let row_7 = branches2[3][k];
+                let row_7 = branches2_3[k];
                 let fl_upper_leg_minus_m_rx_ry = row_7 + fl_lower_leg_t15;
-                let row_9 = branches2[5][k];
+                let row_9 = branches2_5[k];
                 let fl_upper_leg_m_rx_rz = row_9 + fl_lower_leg_t6;
-                let row_6 = branches2[2][k];
+                let row_6 = branches2_2[k];
                 let fl_upper_leg_minus_m_ry_ry = row_6 + fl_lower_leg_t18;
-                let row_10 = branches2[6][k];
+                let row_10 = branches2_6[k];
                 let fl_upper_leg_m_ry_rz = row_10 + fl_lower_leg_t7;
                 let fl_upper_leg_m_rz_rz = fl_lower_leg_t19 + 0.0022955781994879005;
                 let fl_lower_leg_t20 = row_12 * fl_lower_leg_t0;
                 let fl_lower_leg_t21 = fl_lower_leg_t20 + 0.0005426192213171668;
                 let fl_lower_leg_t22 = row_11 * fl_lower_leg_t1;
                 let fl_lower_leg_t23 = fl_lower_leg_t21 + fl_lower_leg_t22;
-                let row_28 = branches2[22][k];
+                let row_28 = branches2_22[k];
                 let fl_lower_leg_t24 = row_14 * row_28;
-                let row_29 = branches2[23][k];
+                let row_29 = branches2_23[k];
                 let fl_lower_leg_t25 = row_13 * row_29;
                 let fl_lower_leg_t26 = fl_lower_leg_t24 - fl_lower_leg_t25;
                 let fl_lower_leg_t27 = row_13 * row_28;
                 let fl_lower_leg_t28 = row_14 * row_29;
                 let fl_lower_leg_t29 = fl_lower_leg_t27 + fl_lower_leg_t28;
-                let row_31 = branches2[25][k];
+                let row_31 = branches2_25[k];
                 let fl_lower_leg_t30 = row_14 * row_31;
-                let row_32 = branches2[26][k];
+                let row_32 = branches2_26[k];
                 let fl_lower_leg_t31 = row_13 * row_32;
                 let fl_lower_leg_t32 = fl_lower_leg_t30 - fl_lower_leg_t31;
                 let fl_lower_leg_t33 = row_13 * row_31;
                 let fl_lower_leg_t34 = row_14 * row_32;
                 let fl_lower_leg_t35 = fl_lower_leg_t33 + fl_lower_leg_t34;
                 let fl_lower_leg_t36 = row_12 * fl_lower_leg_t26;
-                let row_33 = branches2[27][k];
+                let row_33 = branches2_27[k];
                 let fl_lower_leg_t37 = row_33 - fl_lower_leg_t36;
-                let row_30 = branches2[24][k];
+                let row_30 = branches2_24[k];
                 let fl_lower_leg_t38 = row_12 * row_30;
                 let fl_lower_leg_t39 = fl_lower_leg_t32 - fl_lower_leg_t38;
                 let fl_lower_leg_t40 = row_11 * row_30;
                 let fl_lower_leg_t41 = fl_lower_leg_t35 + fl_lower_leg_t40;
                 let fl_lower_leg_t42 = row_11 * fl_lower_leg_t29;
                 let fl_lower_leg_t43 = fl_lower_leg_t37 + fl_lower_leg_t42;
-                let row_22 = branches2[16][k];
+                let row_22 = branches2_16[k];
                 let fl_upper_leg_minus_d_x = row_22 + fl_lower_leg_t26;
-                let row_23 = branches2[17][k];
+                let row_23 = branches2_17[k];
                 let fl_upper_leg_minus_d_y = row_23 + fl_lower_leg_t29;
-                let row_24 = branches2[18][k];
+                let row_24 = branches2_18[k];
                 let fl_upper_leg_d_z = row_24 + row_30;
-                let row_25 = branches2[19][k];
+                let row_25 = branches2_19[k];
                 let fl_upper_leg_d_rx = row_25 - fl_lower_leg_t39;
-                let row_26 = branches2[20][k];
+                let row_26 = branches2_20[k];
                 let fl_upper_leg_d_ry = row_26 - fl_lower_leg_t41;
-                let row_27 = branches2[21][k];
+                let row_27 = branches2_21[k];
                 let fl_upper_leg_d_rz = row_27 - fl_lower_leg_t43;
                 let fl_upper_leg_t0 = 1842.9129686423128 * fl_lower_leg_t0;
+                branches3_0[k] = fl_upper_leg_t0;
                 let fl_upper_leg_t1 = 1842.9129686423128 * fl_lower_leg_t1;
+                branches3_1[k] = fl_upper_leg_t1;
                 let fl_upper_leg_t2 = 1842.9129686423128 * fl_lower_leg_t6;
+                branches3_2[k] = fl_upper_leg_t2;
                 let fl_upper_leg_t3 = 1842.9129686423128 * fl_lower_leg_t7;
+                branches3_3[k] = fl_upper_leg_t3;
                 let fl_upper_leg_t4 = 1842.9129686423128 * fl_lower_leg_t23;
+                branches3_4[k] = fl_upper_leg_t4;
                 let fl_upper_leg_t5 = fl_lower_leg_t0 * fl_upper_leg_t0;
                 let fl_upper_leg_t6 = fl_lower_leg_t0 * fl_upper_leg_t1;
                 let fl_upper_leg_t7 = fl_lower_leg_t0 * fl_upper_leg_t2;
@@ -12613,9 +13059,13 @@ impl Solo12 {
                 let fl_upper_leg_u_rz = fl_upper_leg_m_rz_rz - fl_upper_leg_t22;
                 let fl_upper_leg_rho = 1.0 / fl_upper_leg_u_rz;
                 let fl_upper_leg_minus_k_x = fl_upper_leg_minus_u_x * fl_upper_leg_rho;
+                branches3_5[k] = fl_upper_leg_minus_k_x;
                 let fl_upper_leg_k_y = fl_upper_leg_u_y * fl_upper_leg_rho;
+                branches3_6[k] = fl_upper_leg_k_y;
                 let fl_upper_leg_k_rx = fl_upper_leg_u_rx * fl_upper_leg_rho;
+                branches3_7[k] = fl_upper_leg_k_rx;
                 let fl_upper_leg_k_ry = fl_upper_leg_u_ry * fl_upper_leg_rho;
+                branches3_8[k] = fl_upper_leg_k_ry;
                 let fl_upper_leg_t23 = fl_upper_leg_minus_u_x * fl_upper_leg_minus_k_x;
                 let fl_upper_leg_minus_mp_xx = fl_upper_leg_t5 + fl_upper_leg_t23;
                 let fl_upper_leg_t24 = fl_upper_leg_minus_u_x * fl_upper_leg_k_y;
@@ -12644,6 +13094,7 @@ impl Solo12 {
                 let tau_8 = given25[k];
                 let fl_upper_leg_t33 = tau_8 + row_33;
                 let fl_upper_leg_t34 = 1842.9129686423128 * fl_upper_leg_t33;
+                branches3_9[k] = fl_upper_leg_t34;
                 let fl_upper_leg_t35 = fl_lower_leg_t0 * fl_upper_leg_t34;
                 let fl_upper_leg_t36 = fl_lower_leg_t1 * fl_upper_leg_t34;
                 let fl_upper_leg_t37 = fl_lower_leg_t6 * fl_upper_leg_t34;
@@ -12657,6 +13108,7 @@ impl Solo12 {
                 let tau_7 = given26[k];
                 let fl_upper_leg_t45 = tau_7 - fl_upper_leg_t44;
                 let fl_upper_leg_e = fl_upper_leg_rho * fl_upper_leg_t45;
+                branches3_10[k] = fl_upper_leg_e;
                 let fl_upper_leg_t46 = fl_upper_leg_minus_u_x * fl_upper_leg_e;
                 let fl_upper_leg_minus_dp_x = fl_upper_leg_t40 + fl_upper_leg_t46;
                 let fl_upper_leg_t47 = fl_upper_leg_u_y * fl_upper_leg_e;
@@ -12665,17 +13117,17 @@ impl Solo12 {
                 let fl_upper_leg_dp_rx = fl_upper_leg_t42 + fl_upper_leg_t48;
                 let fl_upper_leg_t49 = fl_upper_leg_u_ry * fl_upper_leg_e;
                 let fl_upper_leg_dp_ry = fl_upper_leg_t43 + fl_upper_leg_t49;
-                let row_16 = branches2[10][k];
+                let row_16 = branches2_10[k];
                 let fl_shoulder_d_x = row_16 - fl_upper_leg_minus_dp_x;
-                let row_17 = branches2[11][k];
+                let row_17 = branches2_11[k];
                 let fl_shoulder_minus_d_y = row_17 - fl_upper_leg_d_z;
-                let row_18 = branches2[12][k];
+                let row_18 = branches2_12[k];
                 let fl_shoulder_d_z = row_18 + fl_upper_leg_minus_dp_y;
-                let row_20 = branches2[14][k];
+                let row_20 = branches2_14[k];
                 let fl_shoulder_d_rx = row_20 + fl_upper_leg_dp_rx;
-                let row_19 = branches2[13][k];
+                let row_19 = branches2_13[k];
                 let fl_shoulder_d_ry = tau_7 - row_19;
-                let row_21 = branches2[15][k];
+                let row_21 = branches2_15[k];
                 let fl_shoulder_minus_d_rz = row_21 + fl_upper_leg_dp_ry;
                 let row_1 = cosines[0][k];
                 let fl_shoulder_t0 = row_1 * fl_upper_leg_minus_mp_xx;
@@ -12738,16 +13190,23 @@ impl Solo12 {
                 let fl_shoulder_t50 = fl_shoulder_t21 - fl_shoulder_t49;
                 let fl_shoulder_minus_rho = 1.0 / fl_shoulder_minus_m_rz_rz;
                 let fl_shoulder_k_x = fl_shoulder_minus_u_x * fl_shoulder_minus_rho;
+                branches3_11[k] = fl_shoulder_k_x;
                 let fl_shoulder_minus_k_y = fl_shoulder_u_y * fl_shoulder_minus_rho;
+                branches3_12[k] = fl_shoulder_minus_k_y;
                 let fl_shoulder_k_z = fl_upper_leg_minus_mp_ry_y * fl_shoulder_minus_rho;
+                branches3_13[k] = fl_shoulder_k_z;
                 let fl_shoulder_minus_k_rx = fl_shoulder_u_rx * fl_shoulder_minus_rho;
+                branches3_14[k] = fl_shoulder_minus_k_rx;
                 let fl_shoulder_k_ry = fl_shoulder_minus_u_ry * fl_shoulder_minus_rho;
+                branches3_15[k] = fl_shoulder_k_ry;
                 let fl_shoulder_t51 = fl_shoulder_minus_u_x * fl_shoulder_k_x;
                 let fl_shoulder_minus_mp_xx = fl_shoulder_t3 - fl_shoulder_t51;
                 let fl_shoulder_t52 = fl_shoulder_minus_u_x * fl_shoulder_minus_k_y;
                 let fl_shoulder_mp_xy = fl_shoulder_t2 - fl_shoulder_t52;
+                branches3_16[k] = fl_shoulder_mp_xy;
                 let fl_shoulder_t53 = fl_shoulder_minus_u_x * fl_shoulder_k_z;
                 let fl_shoulder_minus_mp_xz = fl_shoulder_t4 - fl_shoulder_t53;
+                branches3_17[k] = fl_shoulder_minus_mp_xz;
                 let fl_shoulder_t54 = fl_shoulder_minus_u_x * fl_shoulder_minus_k_rx;
                 let fl_shoulder_mp_rx_x = fl_shoulder_t30 - fl_shoulder_t54;
                 let fl_shoulder_t55 = fl_shoulder_minus_u_x * fl_shoulder_k_ry;
@@ -12756,14 +13215,17 @@ impl Solo12 {
                 let fl_shoulder_minus_mp_yy = fl_shoulder_t1 - fl_shoulder_t56;
                 let fl_shoulder_t57 = fl_shoulder_u_y * fl_shoulder_k_z;
                 let fl_shoulder_mp_yz = fl_shoulder_t5 - fl_shoulder_t57;
+                branches3_18[k] = fl_shoulder_mp_yz;
                 let fl_shoulder_t58 = fl_shoulder_u_y * fl_shoulder_minus_k_rx;
                 let fl_shoulder_minus_mp_rx_y = fl_shoulder_t34 - fl_shoulder_t58;
+                branches3_19[k] = fl_shoulder_minus_mp_rx_y;
                 let fl_shoulder_t59 = fl_shoulder_u_y * fl_shoulder_k_ry;
                 let fl_shoulder_mp_ry_y = fl_shoulder_t35 - fl_shoulder_t59;
                 let fl_shoulder_t60 = fl_upper_leg_minus_mp_ry_y * fl_shoulder_k_z;
                 let fl_shoulder_minus_mp_zz = fl_upper_leg_minus_mp_yy - fl_shoulder_t60;
                 let fl_shoulder_t61 = fl_upper_leg_minus_mp_ry_y * fl_shoulder_minus_k_rx;
                 let fl_shoulder_mp_rx_z = fl_shoulder_t37 - fl_shoulder_t61;
+                branches3_20[k] = fl_shoulder_mp_rx_z;
                 let fl_shoulder_t62 = fl_upper_leg_minus_mp_ry_y * fl_shoulder_k_ry;
                 let fl_shoulder_minus_mp_ry_z = fl_shoulder_t39 - fl_shoulder_t62;
                 let fl_shoulder_t63 = fl_shoulder_u_rx * fl_shoulder_minus_k_rx;
@@ -12775,32 +13237,48 @@ impl Solo12 {
                 let fl_shoulder_t66 = fl_shoulder_minus_mp_yy - fl_shoulder_minus_mp_zz;
                 let fl_shoulder_t67 = fl_shoulder_minus_mp_yy - fl_shoulder_t66;
                 let fl_shoulder_t68 = fl_shoulder_minus_mp_zz + fl_shoulder_t66;
+                branches3_21[k] = fl_shoulder_t68;
                 let table_0 = table[0][k];
                 let fl_shoulder_t69 = table_0 * fl_shoulder_mp_xy;
+                branches3_22[k] = fl_shoulder_t69;
                 let fl_shoulder_t70 = table_0 * fl_shoulder_minus_mp_xz;
                 let fl_shoulder_t71 = fl_shoulder_minus_mp_ry_x - fl_shoulder_t70;
+                branches3_23[k] = fl_shoulder_t71;
                 let fl_shoulder_t72 = table_0 * fl_shoulder_mp_yz;
                 let fl_shoulder_t73 = table_0 * fl_shoulder_t67;
                 let fl_shoulder_t74 = fl_shoulder_minus_mp_ry_z - fl_shoulder_t73;
+                branches3_24[k] = fl_shoulder_t74;
                 let fl_shoulder_t75 = table_0 * fl_shoulder_t68;
+                branches3_25[k] = fl_shoulder_t75;
                 let fl_shoulder_t76 = fl_shoulder_mp_ry_y - fl_shoulder_t72;
+                branches3_26[k] = fl_shoulder_t76;
                 let fl_shoulder_t77 = table_0 * fl_shoulder_minus_mp_rx_y;
+                branches3_27[k] = fl_shoulder_t77;
                 let fl_shoulder_t78 = table_0 * fl_shoulder_mp_rx_z;
                 let fl_shoulder_t79 = fl_shoulder_minus_mp_rx_ry + fl_shoulder_t78;
+                branches3_28[k] = fl_shoulder_t79;
                 let fl_shoulder_t80 = table_0 * fl_shoulder_t75;
                 let fl_shoulder_t81 = fl_shoulder_minus_mp_ry_z + fl_shoulder_t74;
                 let fl_shoulder_t82 = table_0 * fl_shoulder_t81;
                 let fl_shoulder_t83 = fl_shoulder_mp_ry_ry + fl_shoulder_t82;
+                branches3_29[k] = fl_shoulder_t83;
                 let fl_shoulder_t84 = table_0 * fl_shoulder_t76;
+                branches3_30[k] = fl_shoulder_t84;
                 let fl_shoulder_t85 = fl_shoulder_minus_mp_xx - fl_shoulder_t67;
                 let fl_shoulder_t86 = fl_shoulder_minus_mp_xx - fl_shoulder_t85;
+                branches3_31[k] = fl_shoulder_t86;
                 let fl_shoulder_t87 = fl_shoulder_t67 + fl_shoulder_t85;
+                branches3_32[k] = fl_shoulder_t87;
                 let fl_shoulder_t88 = fl_shoulder_mp_rx_x - fl_shoulder_t72;
                 let fl_shoulder_t89 = fl_shoulder_mp_rx_x - fl_shoulder_t88;
+                branches3_33[k] = fl_shoulder_t89;
                 let fl_shoulder_t90 = fl_shoulder_t72 + fl_shoulder_t88;
+                branches3_34[k] = fl_shoulder_t90;
                 let fl_shoulder_t91 = fl_shoulder_mp_rx_rx + fl_shoulder_t80;
                 let fl_shoulder_t92 = fl_shoulder_mp_rx_rx - fl_shoulder_t91;
+                branches3_35[k] = fl_shoulder_t92;
                 let fl_shoulder_t93 = fl_shoulder_t80 - fl_shoulder_t91;
+                branches3_36[k] = fl_shoulder_t93;
                 let fl_shoulder_t94 = row_0 * fl_shoulder_d_x;
                 let fl_shoulder_t95 = row_1 * fl_shoulder_minus_d_y;
                 let fl_shoulder_t96 = fl_shoulder_t94 - fl_shoulder_t95;
@@ -12820,268 +13298,231 @@ impl Solo12 {
                 let tau_6 = given38[k];
                 let fl_shoulder_t110 = tau_6 + fl_shoulder_minus_d_rz;
                 let fl_shoulder_minus_e = fl_shoulder_minus_rho * fl_shoulder_t110;
+                branches3_37[k] = fl_shoulder_minus_e;
                 let fl_shoulder_t111 = fl_shoulder_minus_u_x * fl_shoulder_minus_e;
                 let fl_shoulder_dp_x = fl_shoulder_t96 + fl_shoulder_t111;
+                branches3_38[k] = fl_shoulder_dp_x;
                 let fl_shoulder_t112 = fl_shoulder_u_y * fl_shoulder_minus_e;
                 let fl_shoulder_minus_dp_y = fl_shoulder_t99 + fl_shoulder_t112;
+                branches3_39[k] = fl_shoulder_minus_dp_y;
                 let fl_shoulder_t113 = fl_upper_leg_minus_mp_ry_y * fl_shoulder_minus_e;
                 let fl_shoulder_dp_z = fl_shoulder_d_z + fl_shoulder_t113;
+                branches3_40[k] = fl_shoulder_dp_z;
                 let fl_shoulder_t114 = fl_shoulder_u_rx * fl_shoulder_minus_e;
                 let fl_shoulder_dp_rx = fl_shoulder_t107 - fl_shoulder_t114;
+                branches3_41[k] = fl_shoulder_dp_rx;
                 let fl_shoulder_t115 = fl_shoulder_minus_u_ry * fl_shoulder_minus_e;
                 let fl_shoulder_minus_dp_ry = fl_shoulder_t109 - fl_shoulder_t115;
                 let fl_shoulder_t116 = table_0 * fl_shoulder_minus_dp_y;
                 let fl_shoulder_t117 = tau_6 - fl_shoulder_t116;
+                branches3_42[k] = fl_shoulder_t117;
                 let fl_shoulder_t118 = table_0 * fl_shoulder_dp_z;
                 let fl_shoulder_t119 = fl_shoulder_minus_dp_ry + fl_shoulder_t118;
-                branches3[0][k] = fl_upper_leg_t0;
-                branches3[1][k] = fl_upper_leg_t1;
-                branches3[2][k] = fl_upper_leg_t2;
-                branches3[3][k] = fl_upper_leg_t3;
-                branches3[4][k] = fl_upper_leg_t4;
-                branches3[5][k] = fl_upper_leg_minus_k_x;
-                branches3[6][k] = fl_upper_leg_k_y;
-                branches3[7][k] = fl_upper_leg_k_rx;
-                branches3[8][k] = fl_upper_leg_k_ry;
-                branches3[9][k] = fl_upper_leg_t34;
-                branches3[10][k] = fl_upper_leg_e;
-                branches3[11][k] = fl_shoulder_k_x;
-                branches3[12][k] = fl_shoulder_minus_k_y;
-                branches3[13][k] = fl_shoulder_k_z;
-                branches3[14][k] = fl_shoulder_minus_k_rx;
-                branches3[15][k] = fl_shoulder_k_ry;
-                branches3[16][k] = fl_shoulder_mp_xy;
-                branches3[17][k] = fl_shoulder_minus_mp_xz;
-                branches3[18][k] = fl_shoulder_mp_yz;
-                branches3[19][k] = fl_shoulder_minus_mp_rx_y;
-                branches3[20][k] = fl_shoulder_mp_rx_z;
-                branches3[21][k] = fl_shoulder_t68;
-                branches3[22][k] = fl_shoulder_t69;
-                branches3[23][k] = fl_shoulder_t71;
-                branches3[24][k] = fl_shoulder_t74;
-                branches3[25][k] = fl_shoulder_t75;
-                branches3[26][k] = fl_shoulder_t76;
-                branches3[27][k] = fl_shoulder_t77;
-                branches3[28][k] = fl_shoulder_t79;
-                branches3[29][k] = fl_shoulder_t83;
-                branches3[30][k] = fl_shoulder_t84;
-                branches3[31][k] = fl_shoulder_t86;
-                branches3[32][k] = fl_shoulder_t87;
-                branches3[33][k] = fl_shoulder_t89;
-                branches3[34][k] = fl_shoulder_t90;
-                branches3[35][k] = fl_shoulder_t92;
-                branches3[36][k] = fl_shoulder_t93;
-                branches3[37][k] = fl_shoulder_minus_e;
-                branches3[38][k] = fl_shoulder_dp_x;
-                branches3[39][k] = fl_shoulder_minus_dp_y;
-                branches3[40][k] = fl_shoulder_dp_z;
-                branches3[41][k] = fl_shoulder_dp_rx;
-                branches3[42][k] = fl_shoulder_t117;
-                branches3[43][k] = fl_shoulder_t119;
+                branches3_43[k] = fl_shoulder_t119;
             }
         }
         {
-            let branch3_row_65 = branches3[31][3];
+            let branch3_row_65 = branches3_31[3];
             // base_link: gravity and wrenches
             let base_link_t0 = branch3_row_65 - 2.50000279;
-            let branch3_row_66 = branches3[32][3];
+            let branch3_row_66 = branches3_32[3];
             let base_link_t1 = branch3_row_66 - 2.50000279;
-            let branch3_row_55 = branches3[21][3];
+            let branch3_row_55 = branches3_21[3];
             let base_link_t2 = branch3_row_55 - 2.50000279;
-            let branch3_row_69 = branches3[35][3];
+            let branch3_row_69 = branches3_35[3];
             let base_link_t3 = branch3_row_69 + 0.016036324706249997;
-            let branch3_row_70 = branches3[36][3];
+            let branch3_row_70 = branches3_36[3];
             let base_link_t4 = branch3_row_70 - 0.05721008180454845;
-            let branch3_row_63 = branches3[29][3];
+            let branch3_row_63 = branches3_29[3];
             let base_link_t5 = branch3_row_63 + 0.07284082651079846;
             let kept_3 = kept[3];
-            let branch3_row_76 = branches3[42][3];
+            let branch3_row_76 = branches3_42[3];
             let base_link_t6 = kept_3 + branch3_row_76;
             let kept_4 = kept[4];
-            let branch3_row_75 = branches3[41][3];
+            let branch3_row_75 = branches3_41[3];
             let base_link_t7 = kept_4 - branch3_row_75;
             let kept_5 = kept[5];
-            let branch3_row_77 = branches3[43][3];
+            let branch3_row_77 = branches3_43[3];
             let base_link_t8 = kept_5 - branch3_row_77;
-            let branch2_row_65 = branches3[31][2];
+            let branch2_row_65 = branches3_31[2];
             let base_link_t9 = branch2_row_65 + base_link_t0;
-            let branch2_row_51 = branches3[17][2];
-            let branch3_row_51 = branches3[17][3];
+            let branch2_row_51 = branches3_17[2];
+            let branch3_row_51 = branches3_17[3];
             let base_link_t10 = branch2_row_51 + branch3_row_51;
-            let branch2_row_52 = branches3[18][2];
-            let branch3_row_52 = branches3[18][3];
+            let branch2_row_52 = branches3_18[2];
+            let branch3_row_52 = branches3_18[3];
             let base_link_t11 = branch2_row_52 + branch3_row_52;
-            let branch2_row_66 = branches3[32][2];
+            let branch2_row_66 = branches3_32[2];
             let base_link_t12 = branch2_row_66 + base_link_t1;
-            let branch2_row_50 = branches3[16][2];
-            let branch3_row_50 = branches3[16][3];
+            let branch2_row_50 = branches3_16[2];
+            let branch3_row_50 = branches3_16[3];
             let base_link_t13 = branch2_row_50 + branch3_row_50;
-            let branch2_row_55 = branches3[21][2];
+            let branch2_row_55 = branches3_21[2];
             let base_link_t14 = branch2_row_55 + base_link_t2;
-            let branch2_row_67 = branches3[33][2];
-            let branch3_row_67 = branches3[33][3];
+            let branch2_row_67 = branches3_33[2];
+            let branch3_row_67 = branches3_33[3];
             let base_link_t15 = branch2_row_67 + branch3_row_67;
-            let branch2_row_56 = branches3[22][2];
-            let branch3_row_56 = branches3[22][3];
+            let branch2_row_56 = branches3_22[2];
+            let branch3_row_56 = branches3_22[3];
             let base_link_t16 = branch2_row_56 + branch3_row_56;
-            let branch2_row_59 = branches3[25][2];
-            let branch3_row_59 = branches3[25][3];
+            let branch2_row_59 = branches3_25[2];
+            let branch3_row_59 = branches3_25[3];
             let base_link_t17 = branch2_row_59 + branch3_row_59;
-            let branch2_row_54 = branches3[20][2];
-            let branch3_row_54 = branches3[20][3];
+            let branch2_row_54 = branches3_20[2];
+            let branch3_row_54 = branches3_20[3];
             let base_link_t18 = branch2_row_54 + branch3_row_54;
-            let branch2_row_68 = branches3[34][2];
-            let branch3_row_68 = branches3[34][3];
+            let branch2_row_68 = branches3_34[2];
+            let branch3_row_68 = branches3_34[3];
             let base_link_t19 = branch2_row_68 + branch3_row_68;
-            let branch2_row_53 = branches3[19][2];
-            let branch3_row_53 = branches3[19][3];
+            let branch2_row_53 = branches3_19[2];
+            let branch3_row_53 = branches3_19[3];
             let base_link_t20 = branch2_row_53 + branch3_row_53;
-            let branch2_row_58 = branches3[24][2];
-            let branch3_row_58 = branches3[24][3];
+            let branch2_row_58 = branches3_24[2];
+            let branch3_row_58 = branches3_24[3];
             let base_link_t21 = branch2_row_58 + branch3_row_58;
-            let branch2_row_57 = branches3[23][2];
-            let branch3_row_57 = branches3[23][3];
+            let branch2_row_57 = branches3_23[2];
+            let branch3_row_57 = branches3_23[3];
             let base_link_t22 = branch2_row_57 + branch3_row_57;
-            let branch2_row_60 = branches3[26][2];
-            let branch3_row_60 = branches3[26][3];
+            let branch2_row_60 = branches3_26[2];
+            let branch3_row_60 = branches3_26[3];
             let base_link_t23 = branch2_row_60 + branch3_row_60;
-            let branch2_row_69 = branches3[35][2];
+            let branch2_row_69 = branches3_35[2];
             let base_link_t24 = branch2_row_69 + base_link_t3;
-            let branch2_row_61 = branches3[27][2];
-            let branch3_row_61 = branches3[27][3];
+            let branch2_row_61 = branches3_27[2];
+            let branch3_row_61 = branches3_27[3];
             let base_link_t25 = branch2_row_61 + branch3_row_61;
-            let branch2_row_64 = branches3[30][2];
-            let branch3_row_64 = branches3[30][3];
+            let branch2_row_64 = branches3_30[2];
+            let branch3_row_64 = branches3_30[3];
             let base_link_t26 = branch2_row_64 + branch3_row_64;
-            let branch2_row_70 = branches3[36][2];
+            let branch2_row_70 = branches3_36[2];
             let base_link_t27 = branch2_row_70 + base_link_t4;
-            let branch2_row_62 = branches3[28][2];
-            let branch3_row_62 = branches3[28][3];
+            let branch2_row_62 = branches3_28[2];
+            let branch3_row_62 = branches3_28[3];
             let base_link_t28 = branch2_row_62 + branch3_row_62;
-            let branch2_row_63 = branches3[29][2];
+            let branch2_row_63 = branches3_29[2];
             let base_link_t29 = branch2_row_63 + base_link_t5;
-            let branch2_row_74 = branches3[40][2];
-            let branch3_row_74 = branches3[40][3];
+            let branch2_row_74 = branches3_40[2];
+            let branch3_row_74 = branches3_40[3];
             let base_link_t30 = branch2_row_74 + branch3_row_74;
-            let branch2_row_72 = branches3[38][2];
-            let branch3_row_72 = branches3[38][3];
+            let branch2_row_72 = branches3_38[2];
+            let branch3_row_72 = branches3_38[3];
             let base_link_t31 = branch2_row_72 + branch3_row_72;
-            let branch2_row_73 = branches3[39][2];
-            let branch3_row_73 = branches3[39][3];
+            let branch2_row_73 = branches3_39[2];
+            let branch3_row_73 = branches3_39[3];
             let base_link_t32 = branch2_row_73 + branch3_row_73;
-            let branch2_row_76 = branches3[42][2];
+            let branch2_row_76 = branches3_42[2];
             let base_link_t33 = branch2_row_76 + base_link_t6;
-            let branch2_row_75 = branches3[41][2];
+            let branch2_row_75 = branches3_41[2];
             let base_link_t34 = branch2_row_75 - base_link_t7;
-            let branch2_row_77 = branches3[43][2];
+            let branch2_row_77 = branches3_43[2];
             let base_link_t35 = branch2_row_77 - base_link_t8;
-            let branch1_row_65 = branches3[31][1];
+            let branch1_row_65 = branches3_31[1];
             let base_link_t36 = branch1_row_65 + base_link_t9;
-            let branch1_row_51 = branches3[17][1];
+            let branch1_row_51 = branches3_17[1];
             let base_link_t37 = branch1_row_51 + base_link_t10;
-            let branch1_row_52 = branches3[18][1];
+            let branch1_row_52 = branches3_18[1];
             let base_link_t38 = branch1_row_52 + base_link_t11;
-            let branch1_row_66 = branches3[32][1];
+            let branch1_row_66 = branches3_32[1];
             let base_link_t39 = branch1_row_66 + base_link_t12;
-            let branch1_row_50 = branches3[16][1];
+            let branch1_row_50 = branches3_16[1];
             let base_link_t40 = branch1_row_50 + base_link_t13;
-            let branch1_row_55 = branches3[21][1];
+            let branch1_row_55 = branches3_21[1];
             let base_link_t41 = branch1_row_55 + base_link_t14;
-            let branch1_row_67 = branches3[33][1];
+            let branch1_row_67 = branches3_33[1];
             let base_link_t42 = branch1_row_67 + base_link_t15;
-            let branch1_row_56 = branches3[22][1];
+            let branch1_row_56 = branches3_22[1];
             let base_link_t43 = branch1_row_56 + base_link_t16;
-            let branch1_row_59 = branches3[25][1];
+            let branch1_row_59 = branches3_25[1];
             let base_link_t44 = branch1_row_59 + base_link_t17;
-            let branch1_row_54 = branches3[20][1];
+            let branch1_row_54 = branches3_20[1];
             let base_link_t45 = branch1_row_54 + base_link_t18;
-            let branch1_row_68 = branches3[34][1];
+            let branch1_row_68 = branches3_34[1];
             let base_link_t46 = branch1_row_68 + base_link_t19;
-            let branch1_row_53 = branches3[19][1];
+            let branch1_row_53 = branches3_19[1];
             let base_link_t47 = branch1_row_53 + base_link_t20;
-            let branch1_row_58 = branches3[24][1];
+            let branch1_row_58 = branches3_24[1];
             let base_link_t48 = branch1_row_58 + base_link_t21;
-            let branch1_row_57 = branches3[23][1];
+            let branch1_row_57 = branches3_23[1];
             let base_link_t49 = branch1_row_57 + base_link_t22;
-            let branch1_row_60 = branches3[26][1];
+            let branch1_row_60 = branches3_26[1];
             let base_link_t50 = branch1_row_60 + base_link_t23;
-            let branch1_row_69 = branches3[35][1];
+            let branch1_row_69 = branches3_35[1];
             let base_link_t51 = branch1_row_69 + base_link_t24;
-            let branch1_row_61 = branches3[27][1];
+            let branch1_row_61 = branches3_27[1];
             let base_link_t52 = branch1_row_61 + base_link_t25;
-            let branch1_row_64 = branches3[30][1];
+            let branch1_row_64 = branches3_30[1];
             let base_link_t53 = branch1_row_64 + base_link_t26;
-            let branch1_row_70 = branches3[36][1];
+            let branch1_row_70 = branches3_36[1];
             let base_link_t54 = branch1_row_70 + base_link_t27;
-            let branch1_row_62 = branches3[28][1];
+            let branch1_row_62 = branches3_28[1];
             let base_link_t55 = branch1_row_62 + base_link_t28;
-            let branch1_row_63 = branches3[29][1];
+            let branch1_row_63 = branches3_29[1];
             let base_link_t56 = branch1_row_63 + base_link_t29;
-            let branch1_row_74 = branches3[40][1];
+            let branch1_row_74 = branches3_40[1];
             let base_link_t57 = branch1_row_74 + base_link_t30;
-            let branch1_row_72 = branches3[38][1];
+            let branch1_row_72 = branches3_38[1];
             let base_link_t58 = branch1_row_72 + base_link_t31;
-            let branch1_row_73 = branches3[39][1];
+            let branch1_row_73 = branches3_39[1];
             let base_link_t59 = branch1_row_73 + base_link_t32;
-            let branch1_row_76 = branches3[42][1];
+            let branch1_row_76 = branches3_42[1];
             let base_link_t60 = branch1_row_76 + base_link_t33;
-            let branch1_row_75 = branches3[41][1];
+            let branch1_row_75 = branches3_41[1];
             let base_link_t61 = branch1_row_75 + base_link_t34;
-            let branch1_row_77 = branches3[43][1];
+            let branch1_row_77 = branches3_43[1];
             let base_link_t62 = branch1_row_77 + base_link_t35;
-            let branch0_row_65 = branches3[31][0];
+            let branch0_row_65 = branches3_31[0];
             let base_link_minus_m_xx = branch0_row_65 + base_link_t36;
-            let branch0_row_51 = branches3[17][0];
+            let branch0_row_51 = branches3_17[0];
             let base_link_minus_m_xy = branch0_row_51 + base_link_t37;
-            let branch0_row_52 = branches3[18][0];
+            let branch0_row_52 = branches3_18[0];
             let base_link_m_xz = branch0_row_52 + base_link_t38;
-            let branch0_row_66 = branches3[32][0];
+            let branch0_row_66 = branches3_32[0];
             let base_link_minus_m_yy = branch0_row_66 + base_link_t39;
-            let branch0_row_50 = branches3[16][0];
+            let branch0_row_50 = branches3_16[0];
             let base_link_m_yz = branch0_row_50 + base_link_t40;
-            let branch0_row_55 = branches3[21][0];
+            let branch0_row_55 = branches3_21[0];
             let base_link_minus_m_zz = branch0_row_55 + base_link_t41;
-            let branch0_row_67 = branches3[33][0];
+            let branch0_row_67 = branches3_33[0];
             let base_link_m_rx_x = branch0_row_67 + base_link_t42;
-            let branch0_row_56 = branches3[22][0];
+            let branch0_row_56 = branches3_22[0];
             let base_link_m_rx_y = branch0_row_56 + base_link_t43;
-            let branch0_row_59 = branches3[25][0];
+            let branch0_row_59 = branches3_25[0];
             let base_link_minus_m_rx_z = branch0_row_59 + base_link_t44;
-            let branch0_row_54 = branches3[20][0];
+            let branch0_row_54 = branches3_20[0];
             let base_link_m_ry_x = branch0_row_54 + base_link_t45;
-            let branch0_row_68 = branches3[34][0];
+            let branch0_row_68 = branches3_34[0];
             let base_link_m_ry_y = branch0_row_68 + base_link_t46;
-            let branch0_row_53 = branches3[19][0];
+            let branch0_row_53 = branches3_19[0];
             let base_link_minus_m_ry_z = branch0_row_53 + base_link_t47;
-            let branch0_row_58 = branches3[24][0];
+            let branch0_row_58 = branches3_24[0];
             let base_link_minus_m_rz_x = branch0_row_58 + base_link_t48;
-            let branch0_row_57 = branches3[23][0];
+            let branch0_row_57 = branches3_23[0];
             let base_link_minus_m_rz_y = branch0_row_57 + base_link_t49;
-            let branch0_row_60 = branches3[26][0];
+            let branch0_row_60 = branches3_26[0];
             let base_link_m_rz_z = branch0_row_60 + base_link_t50;
-            let branch0_row_69 = branches3[35][0];
+            let branch0_row_69 = branches3_35[0];
             let base_link_m_rx_rx = branch0_row_69 + base_link_t51;
-            let branch0_row_61 = branches3[27][0];
+            let branch0_row_61 = branches3_27[0];
             let base_link_minus_m_rx_ry = branch0_row_61 + base_link_t52;
-            let branch0_row_64 = branches3[30][0];
+            let branch0_row_64 = branches3_30[0];
             let base_link_m_rx_rz = branch0_row_64 + base_link_t53;
-            let branch0_row_70 = branches3[36][0];
+            let branch0_row_70 = branches3_36[0];
             let base_link_minus_m_ry_ry = branch0_row_70 + base_link_t54;
-            let branch0_row_62 = branches3[28][0];
+            let branch0_row_62 = branches3_28[0];
             let base_link_minus_m_ry_rz = branch0_row_62 + base_link_t55;
-            let branch0_row_63 = branches3[29][0];
+            let branch0_row_63 = branches3_29[0];
             let base_link_m_rz_rz = branch0_row_63 + base_link_t56;
-            let branch0_row_74 = branches3[40][0];
+            let branch0_row_74 = branches3_40[0];
             let base_link_d_x = branch0_row_74 + base_link_t57;
-            let branch0_row_72 = branches3[38][0];
+            let branch0_row_72 = branches3_38[0];
             let base_link_d_y = branch0_row_72 + base_link_t58;
-            let branch0_row_73 = branches3[39][0];
+            let branch0_row_73 = branches3_39[0];
             let base_link_minus_d_z = branch0_row_73 + base_link_t59;
-            let branch0_row_76 = branches3[42][0];
+            let branch0_row_76 = branches3_42[0];
             let base_link_d_rx = branch0_row_76 + base_link_t60;
-            let branch0_row_75 = branches3[41][0];
+            let branch0_row_75 = branches3_41[0];
             let base_link_d_ry = branch0_row_75 + base_link_t61;
-            let branch0_row_77 = branches3[43][0];
+            let branch0_row_77 = branches3_43[0];
             let base_link_minus_d_rz = branch0_row_77 + base_link_t62;
             // base_link: U, Mj, k and the reduced inertia M' (4.44)
             let base_link_minus_rho = 1.0 / base_link_minus_m_xx;
@@ -13224,19 +13665,26 @@ impl Solo12 {
             let tau_5 = tau.get(5, 0);
             let base_link_t153 = tau_5 + base_link_t152;
             let base_link_e_2 = base_link_rho_2 * base_link_t153;
+            a.set(5, 0, base_link_e_2);
+            kept[6] = base_link_e_2;
             // base_link: acceleration
             let base_link_t154 = base_link_k_rz_4 * base_link_e_2;
             let base_link_minus_a = base_link_minus_e_4 + base_link_t154;
+            a.set(4, 0, -base_link_minus_a);
+            kept[7] = base_link_minus_a;
             let base_link_t155 = base_link_minus_k_ry_3 * base_link_minus_a;
             let base_link_t156 = base_link_k_rz_3 * base_link_e_2;
             let base_link_t157 = base_link_t155 + base_link_t156;
             let base_link_a = base_link_e - base_link_t157;
+            a.set(3, 0, base_link_a);
+            kept[8] = base_link_a;
             let base_link_t158 = base_link_k_rx * base_link_a;
             let base_link_t159 = base_link_k_ry * base_link_minus_a;
             let base_link_t160 = base_link_t158 - base_link_t159;
             let base_link_t161 = base_link_minus_k_rz * base_link_e_2;
             let base_link_t162 = base_link_t160 - base_link_t161;
             let base_link_minus_a_2 = base_link_minus_e_3 + base_link_t162;
+            kept[9] = base_link_minus_a_2;
             let base_link_t163 = base_link_minus_k_z_2 * base_link_minus_a_2;
             let base_link_t164 = base_link_minus_k_rx_2 * base_link_a;
             let base_link_t165 = base_link_minus_k_ry_2 * base_link_minus_a;
@@ -13245,6 +13693,7 @@ impl Solo12 {
             let base_link_t168 = base_link_t166 - base_link_t167;
             let base_link_t169 = base_link_t163 - base_link_t168;
             let base_link_minus_a_3 = base_link_minus_e_2 + base_link_t169;
+            kept[10] = base_link_minus_a_3;
             let base_link_t170 = base_link_k_y * base_link_minus_a_3;
             let base_link_t171 = base_link_minus_k_z * base_link_minus_a_2;
             let base_link_t172 = base_link_t170 - base_link_t171;
@@ -13255,26 +13704,20 @@ impl Solo12 {
             let base_link_t177 = base_link_t175 - base_link_t176;
             let base_link_t178 = base_link_t172 + base_link_t177;
             let base_link_minus_a_4 = base_link_minus_e - base_link_t178;
+            kept[11] = base_link_minus_a_4;
             let kept_0 = kept[0];
             let base_link_t179 = kept_0 + base_link_minus_a_4;
+            a.set(0, 0, -base_link_t179);
             let kept_1 = kept[1];
             let base_link_t180 = kept_1 + base_link_minus_a_3;
+            a.set(1, 0, -base_link_t180);
             let kept_2 = kept[2];
             let base_link_t181 = kept_2 - base_link_minus_a_2;
-            a.set(0, 0, -base_link_t179);
-            a.set(1, 0, -base_link_t180);
             a.set(2, 0, base_link_t181);
-            a.set(3, 0, base_link_a);
-            a.set(4, 0, -base_link_minus_a);
-            a.set(5, 0, base_link_e_2);
-            kept[6] = base_link_e_2;
-            kept[7] = base_link_minus_a;
-            kept[8] = base_link_a;
-            kept[9] = base_link_minus_a_2;
-            kept[10] = base_link_minus_a_3;
-            kept[11] = base_link_minus_a_4;
         }
-        let mut branches5 = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 3]);
+        let mut branches5_0 = [0.0; LANES];
+        let mut branches5_1 = [0.0; LANES];
+        let mut branches5_2 = [0.0; LANES];
         {
             let table = Self::ACCELERATIONS_BRANCHES0;
             for k in 0..4 {
@@ -13287,25 +13730,26 @@ impl Solo12 {
                 let fl_shoulder_t1 = table_0 * carried_3;
                 let carried_2 = -kept[9];
                 let fl_shoulder_hatd_y = carried_2 + fl_shoulder_t1;
-                let row_45 = branches3[11][k];
+                let row_45 = branches3_11[k];
                 let carried_1 = -kept[10];
                 let fl_shoulder_t2 = row_45 * carried_1;
-                let row_46 = branches3[12][k];
+                let row_46 = branches3_12[k];
                 let fl_shoulder_t3 = row_46 * fl_shoulder_hatd_y;
                 let fl_shoulder_t4 = fl_shoulder_t2 - fl_shoulder_t3;
-                let row_47 = branches3[13][k];
+                let row_47 = branches3_13[k];
                 let fl_shoulder_t5 = row_47 * fl_shoulder_hatd_z;
                 let fl_shoulder_t6 = fl_shoulder_t4 + fl_shoulder_t5;
-                let row_48 = branches3[14][k];
+                let row_48 = branches3_14[k];
                 let carried_4 = -kept[7];
                 let fl_shoulder_t7 = row_48 * carried_4;
-                let row_49 = branches3[15][k];
+                let row_49 = branches3_15[k];
                 let fl_shoulder_t8 = row_49 * carried_5;
                 let fl_shoulder_t9 = fl_shoulder_t7 - fl_shoulder_t8;
                 let fl_shoulder_t10 = fl_shoulder_t6 - fl_shoulder_t9;
-                let row_71 = branches3[37][k];
+                let row_71 = branches3_37[k];
                 let fl_shoulder_minus_omegad_rz = row_71 + fl_shoulder_t10;
                 let fl_shoulder_minus_a = carried_3 + fl_shoulder_minus_omegad_rz;
+                branches5_0[k] = -fl_shoulder_minus_a;
                 let table_1 = table[1][k];
                 let fl_shoulder_t11 = table_1 * carried_5;
                 let fl_shoulder_t12 = carried_1 + fl_shoulder_t11;
@@ -13322,54 +13766,53 @@ impl Solo12 {
                 let fl_shoulder_t19 = row_0 * carried_5;
                 let fl_shoulder_t20 = row_1 * carried_4;
                 let fl_shoulder_omegad_ry = fl_shoulder_t19 + fl_shoulder_t20;
-                let row_39 = branches3[5][k];
+                let row_39 = branches3_5[k];
                 let fl_upper_leg_t0 = row_39 * fl_shoulder_omegad_x;
-                let row_40 = branches3[6][k];
+                let row_40 = branches3_6[k];
                 let fl_upper_leg_t1 = row_40 * fl_shoulder_hatd_z;
                 let fl_upper_leg_t2 = fl_upper_leg_t0 + fl_upper_leg_t1;
-                let row_41 = branches3[7][k];
+                let row_41 = branches3_7[k];
                 let fl_upper_leg_t3 = row_41 * fl_shoulder_omegad_rx;
-                let row_42 = branches3[8][k];
+                let row_42 = branches3_8[k];
                 let fl_upper_leg_t4 = row_42 * fl_shoulder_minus_omegad_rz;
                 let fl_upper_leg_t5 = fl_upper_leg_t3 + fl_upper_leg_t4;
                 let fl_upper_leg_t6 = fl_upper_leg_t2 - fl_upper_leg_t5;
-                let row_44 = branches3[10][k];
+                let row_44 = branches3_10[k];
                 let fl_upper_leg_omegad_rz = row_44 + fl_upper_leg_t6;
                 let fl_upper_leg_minus_a = fl_shoulder_omegad_ry - fl_upper_leg_omegad_rz;
-                let row_34 = branches3[0][k];
+                let row_34 = branches3_0[k];
                 let fl_upper_leg_t7 = row_34 * fl_shoulder_omegad_x;
-                let row_35 = branches3[1][k];
+                let row_35 = branches3_1[k];
                 let fl_upper_leg_t8 = row_35 * fl_shoulder_hatd_z;
                 let fl_upper_leg_t9 = fl_upper_leg_t7 + fl_upper_leg_t8;
-                let row_36 = branches3[2][k];
+                let row_36 = branches3_2[k];
                 let fl_upper_leg_t10 = row_36 * fl_shoulder_omegad_rx;
-                let row_37 = branches3[3][k];
+                let row_37 = branches3_3[k];
                 let fl_upper_leg_t11 = row_37 * fl_shoulder_minus_omegad_rz;
                 let fl_upper_leg_t12 = fl_upper_leg_t10 + fl_upper_leg_t11;
-                let row_38 = branches3[4][k];
+                let row_38 = branches3_4[k];
                 let fl_upper_leg_t13 = row_38 * fl_upper_leg_omegad_rz;
                 let fl_upper_leg_t14 = fl_upper_leg_t12 + fl_upper_leg_t13;
                 let fl_upper_leg_t15 = fl_upper_leg_t9 - fl_upper_leg_t14;
-                let row_43 = branches3[9][k];
+                let row_43 = branches3_9[k];
                 let fl_lower_leg_a = row_43 + fl_upper_leg_t15;
-                let row_15 = branches2[9][k];
+                branches5_2[k] = fl_lower_leg_a;
+                let row_15 = branches2_9[k];
                 let fl_upper_leg_t16 = row_15 - fl_upper_leg_minus_a;
-                branches5[0][k] = -fl_shoulder_minus_a;
-                branches5[1][k] = fl_upper_leg_t16;
-                branches5[2][k] = fl_lower_leg_a;
+                branches5_1[k] = fl_upper_leg_t16;
             }
-            a.set(6, 0, branches5[0][0]);
-            a.set(9, 0, branches5[0][1]);
-            a.set(12, 0, branches5[0][2]);
-            a.set(15, 0, branches5[0][3]);
-            a.set(7, 0, branches5[1][0]);
-            a.set(10, 0, branches5[1][1]);
-            a.set(13, 0, branches5[1][2]);
-            a.set(16, 0, branches5[1][3]);
-            a.set(8, 0, branches5[2][0]);
-            a.set(11, 0, branches5[2][1]);
-            a.set(14, 0, branches5[2][2]);
-            a.set(17, 0, branches5[2][3]);
+            a.set(6, 0, branches5_0[0]);
+            a.set(9, 0, branches5_0[1]);
+            a.set(12, 0, branches5_0[2]);
+            a.set(15, 0, branches5_0[3]);
+            a.set(7, 0, branches5_1[0]);
+            a.set(10, 0, branches5_1[1]);
+            a.set(13, 0, branches5_1[2]);
+            a.set(16, 0, branches5_1[3]);
+            a.set(8, 0, branches5_2[0]);
+            a.set(11, 0, branches5_2[1]);
+            a.set(14, 0, branches5_2[2]);
+            a.set(17, 0, branches5_2[3]);
         }
     }
 
@@ -13394,53 +13837,92 @@ impl Solo12 {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 22]);
-        for l in 0..LANES { given[0][l] = q.get(3, l); }
-        for l in 0..LANES { given[1][l] = q.get(4, l); }
-        for l in 0..LANES { given[2][l] = q.get(5, l); }
-        for l in 0..LANES { given[3][l] = q.get(6, l); }
-        for l in 0..LANES { given[4][l] = v.get(0, l); }
-        for l in 0..LANES { given[5][l] = v.get(1, l); }
-        for l in 0..LANES { given[6][l] = v.get(2, l); }
-        for l in 0..LANES { given[7][l] = v.get(3, l); }
-        for l in 0..LANES { given[8][l] = v.get(4, l); }
-        for l in 0..LANES { given[9][l] = v.get(5, l); }
-        for l in 0..LANES { given[10][l] = v.get(6, l); }
-        for l in 0..LANES { given[11][l] = v.get(7, l); }
-        for l in 0..LANES { given[12][l] = v.get(8, l); }
-        for l in 0..LANES { given[13][l] = v.get(9, l); }
-        for l in 0..LANES { given[14][l] = v.get(10, l); }
-        for l in 0..LANES { given[15][l] = v.get(11, l); }
-        for l in 0..LANES { given[16][l] = v.get(12, l); }
-        for l in 0..LANES { given[17][l] = v.get(13, l); }
-        for l in 0..LANES { given[18][l] = v.get(14, l); }
-        for l in 0..LANES { given[19][l] = v.get(15, l); }
-        for l in 0..LANES { given[20][l] = v.get(16, l); }
-        for l in 0..LANES { given[21][l] = v.get(17, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 19]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        let mut given_12 = [0.0; LANES];
+        let mut given_13 = [0.0; LANES];
+        let mut given_14 = [0.0; LANES];
+        let mut given_15 = [0.0; LANES];
+        let mut given_16 = [0.0; LANES];
+        let mut given_17 = [0.0; LANES];
+        let mut given_18 = [0.0; LANES];
+        let mut given_19 = [0.0; LANES];
+        let mut given_20 = [0.0; LANES];
+        let mut given_21 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(3, l); }
+        for l in 0..LANES { given_1[l] = q.get(4, l); }
+        for l in 0..LANES { given_2[l] = q.get(5, l); }
+        for l in 0..LANES { given_3[l] = q.get(6, l); }
+        for l in 0..LANES { given_4[l] = v.get(0, l); }
+        for l in 0..LANES { given_5[l] = v.get(1, l); }
+        for l in 0..LANES { given_6[l] = v.get(2, l); }
+        for l in 0..LANES { given_7[l] = v.get(3, l); }
+        for l in 0..LANES { given_8[l] = v.get(4, l); }
+        for l in 0..LANES { given_9[l] = v.get(5, l); }
+        for l in 0..LANES { given_10[l] = v.get(6, l); }
+        for l in 0..LANES { given_11[l] = v.get(7, l); }
+        for l in 0..LANES { given_12[l] = v.get(8, l); }
+        for l in 0..LANES { given_13[l] = v.get(9, l); }
+        for l in 0..LANES { given_14[l] = v.get(10, l); }
+        for l in 0..LANES { given_15[l] = v.get(11, l); }
+        for l in 0..LANES { given_16[l] = v.get(12, l); }
+        for l in 0..LANES { given_17[l] = v.get(13, l); }
+        for l in 0..LANES { given_18[l] = v.get(14, l); }
+        for l in 0..LANES { given_19[l] = v.get(15, l); }
+        for l in 0..LANES { given_20[l] = v.get(16, l); }
+        for l in 0..LANES { given_21[l] = v.get(17, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
+        let mut result_18 = [0.0; LANES];
         for l in 0..LANES {
-            let q_3 = given[0][l];
-            let q_4 = given[1][l];
-            let q_5 = given[2][l];
-            let q_6 = given[3][l];
-            let v_0 = given[4][l];
-            let v_1 = given[5][l];
-            let v_2 = given[6][l];
-            let v_3 = given[7][l];
-            let v_4 = given[8][l];
-            let v_5 = given[9][l];
-            let v_6 = given[10][l];
-            let v_7 = given[11][l];
-            let v_8 = given[12][l];
-            let v_9 = given[13][l];
-            let v_10 = given[14][l];
-            let v_11 = given[15][l];
-            let v_12 = given[16][l];
-            let v_13 = given[17][l];
-            let v_14 = given[18][l];
-            let v_15 = given[19][l];
-            let v_16 = given[20][l];
-            let v_17 = given[21][l];
+            let q_3 = given_0[l];
+            let q_4 = given_1[l];
+            let q_5 = given_2[l];
+            let q_6 = given_3[l];
+            let v_0 = given_4[l];
+            let v_1 = given_5[l];
+            let v_2 = given_6[l];
+            let v_3 = given_7[l];
+            let v_4 = given_8[l];
+            let v_5 = given_9[l];
+            let v_6 = given_10[l];
+            let v_7 = given_11[l];
+            let v_8 = given_12[l];
+            let v_9 = given_13[l];
+            let v_10 = given_14[l];
+            let v_11 = given_15[l];
+            let v_12 = given_16[l];
+            let v_13 = given_17[l];
+            let v_14 = given_18[l];
+            let v_15 = given_19[l];
+            let v_16 = given_20[l];
+            let v_17 = given_21[l];
             // base_link: coordinate rates
             let base_link_t0 = q_3 + q_3;
             let base_link_t1 = q_4 + q_4;
@@ -13505,36 +13987,36 @@ impl Solo12 {
             let base_link_t60 = q_5 * v_5;
             let base_link_t61 = base_link_t59 + base_link_t60;
             let base_link_t62 = 0.5 * base_link_t61;
-            results[0][l] = base_link_t28;
-            results[1][l] = base_link_t33;
-            results[2][l] = base_link_t38;
-            results[3][l] = base_link_t50;
-            results[4][l] = base_link_t53;
-            results[5][l] = base_link_t56;
-            results[6][l] = -base_link_t62;
-            results[7][l] = v_6;
-            results[8][l] = v_7;
-            results[9][l] = v_8;
-            results[10][l] = v_9;
-            results[11][l] = v_10;
-            results[12][l] = v_11;
-            results[13][l] = v_12;
-            results[14][l] = v_13;
-            results[15][l] = v_14;
-            results[16][l] = v_15;
-            results[17][l] = v_16;
-            results[18][l] = v_17;
+            result_0[l] = base_link_t28;
+            result_1[l] = base_link_t33;
+            result_2[l] = base_link_t38;
+            result_3[l] = base_link_t50;
+            result_4[l] = base_link_t53;
+            result_5[l] = base_link_t56;
+            result_6[l] = -base_link_t62;
+            result_7[l] = v_6;
+            result_8[l] = v_7;
+            result_9[l] = v_8;
+            result_10[l] = v_9;
+            result_11[l] = v_10;
+            result_12[l] = v_11;
+            result_13[l] = v_12;
+            result_14[l] = v_13;
+            result_15[l] = v_14;
+            result_16[l] = v_15;
+            result_17[l] = v_16;
+            result_18[l] = v_17;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
-        qd.give_pair(6, [&results[6], &results[7]]);
-        qd.give_pair(8, [&results[8], &results[9]]);
-        qd.give_pair(10, [&results[10], &results[11]]);
-        qd.give_pair(12, [&results[12], &results[13]]);
-        qd.give_pair(14, [&results[14], &results[15]]);
-        qd.give_pair(16, [&results[16], &results[17]]);
-        qd.give(18, &results[18]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
+        qd.give_pair(6, [&result_6, &result_7]);
+        qd.give_pair(8, [&result_8, &result_9]);
+        qd.give_pair(10, [&result_10, &result_11]);
+        qd.give_pair(12, [&result_12, &result_13]);
+        qd.give_pair(14, [&result_14, &result_15]);
+        qd.give_pair(16, [&result_16, &result_17]);
+        qd.give(18, &result_18);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

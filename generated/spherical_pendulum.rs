@@ -78,33 +78,52 @@ impl SphericalPendulum {
             angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
-        for l in 0..LANES { given[0][l] = q.get(0, l); }
-        for l in 0..LANES { given[1][l] = q.get(1, l); }
-        for l in 0..LANES { given[2][l] = q.get(2, l); }
-        for l in 0..LANES { given[3][l] = q.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(0, l); }
-        for l in 0..LANES { given[5][l] = p.get(1, l); }
-        for l in 0..LANES { given[6][l] = p.get(2, l); }
-        for l in 0..LANES { given[7][l] = p.get(3, l); }
-        for l in 0..LANES { given[8][l] = tau.get(0, l); }
-        for l in 0..LANES { given[9][l] = tau.get(1, l); }
-        for l in 0..LANES { given[10][l] = tau.get(2, l); }
-        for l in 0..LANES { given[11][l] = tau.get(3, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 9]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(0, l); }
+        for l in 0..LANES { given_1[l] = q.get(1, l); }
+        for l in 0..LANES { given_2[l] = q.get(2, l); }
+        for l in 0..LANES { given_3[l] = q.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(0, l); }
+        for l in 0..LANES { given_5[l] = p.get(1, l); }
+        for l in 0..LANES { given_6[l] = p.get(2, l); }
+        for l in 0..LANES { given_7[l] = p.get(3, l); }
+        for l in 0..LANES { given_8[l] = tau.get(0, l); }
+        for l in 0..LANES { given_9[l] = tau.get(1, l); }
+        for l in 0..LANES { given_10[l] = tau.get(2, l); }
+        for l in 0..LANES { given_11[l] = tau.get(3, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
         for l in 0..LANES {
-            let q_0 = given[0][l];
-            let q_1 = given[1][l];
-            let q_2 = given[2][l];
-            let q_3 = given[3][l];
-            let p_0 = given[4][l];
-            let p_1 = given[5][l];
-            let p_2 = given[6][l];
-            let p_3 = given[7][l];
-            let tau_0 = given[8][l];
-            let tau_1 = given[9][l];
-            let tau_2 = given[10][l];
-            let tau_3 = given[11][l];
+            let q_0 = given_0[l];
+            let q_1 = given_1[l];
+            let q_2 = given_2[l];
+            let q_3 = given_3[l];
+            let p_0 = given_4[l];
+            let p_1 = given_5[l];
+            let p_2 = given_6[l];
+            let p_3 = given_7[l];
+            let tau_0 = given_8[l];
+            let tau_1 = given_9[l];
+            let tau_2 = given_10[l];
+            let tau_3 = given_11[l];
             // bob: sine and cosine, rotation
             let bob_t0 = q_0 + q_0;
             let bob_t1 = q_1 + q_1;
@@ -253,21 +272,21 @@ impl SphericalPendulum {
             let pd_1 = tau_1 + bob_t53;
             let pd_2 = tau_2 - bob_t54;
             let pd_3 = tau_3 - tail_t33;
-            results[0][l] = -minus_qd_0;
-            results[1][l] = qd_1;
-            results[2][l] = -minus_qd_2;
-            results[3][l] = -minus_qd_3;
-            results[4][l] = tail_v;
-            results[5][l] = pd_0;
-            results[6][l] = pd_1;
-            results[7][l] = pd_2;
-            results[8][l] = pd_3;
+            result_0[l] = -minus_qd_0;
+            result_1[l] = qd_1;
+            result_2[l] = -minus_qd_2;
+            result_3[l] = -minus_qd_3;
+            result_4[l] = tail_v;
+            result_5[l] = pd_0;
+            result_6[l] = pd_1;
+            result_7[l] = pd_2;
+            result_8[l] = pd_3;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give(4, &results[4]);
-        pd.give_pair(0, [&results[5], &results[6]]);
-        pd.give_pair(2, [&results[7], &results[8]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give(4, &result_4);
+        pd.give_pair(0, [&result_5, &result_6]);
+        pd.give_pair(2, [&result_7, &result_8]);
     }
 
     /// Velocities from momenta.
@@ -286,17 +305,23 @@ impl SphericalPendulum {
             angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
-            let p_2 = given[2][l];
-            let p_3 = given[3][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
+            let p_2 = given_2[l];
+            let p_3 = given_3[l];
             // tail: sine and cosine, rotation
             let tail_sin = sines[0][l];
             let tail_cos = cosines[0][l];
@@ -352,13 +377,13 @@ impl SphericalPendulum {
             let tail_t13 = tail_minus_k_x * tail_hat_x;
             let tail_omega_rz = tail_e + tail_t13;
             let tail_v = bob_minus_e + tail_omega_rz;
-            results[0][l] = bob_v;
-            results[1][l] = -bob_minus_e;
-            results[2][l] = -bob_minus_e_2;
-            results[3][l] = tail_v;
+            result_0[l] = bob_v;
+            result_1[l] = -bob_minus_e;
+            result_2[l] = -bob_minus_e_2;
+            result_3[l] = tail_v;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        v.give_pair(2, [&results[2], &results[3]]);
+        v.give_pair(0, [&result_0, &result_1]);
+        v.give_pair(2, [&result_2, &result_3]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -377,17 +402,23 @@ impl SphericalPendulum {
             angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
             // tail: sine and cosine, rotation
             let tail_sin = sines[0][l];
             let tail_cos = cosines[0][l];
@@ -432,13 +463,13 @@ impl SphericalPendulum {
             let bob_p_rx = bob_t0 - tail_t20;
             let bob_p_ry = bob_t1 + tail_t22;
             let bob_p_rz = bob_t2 + tail_t18;
-            results[0][l] = bob_p_rx;
-            results[1][l] = bob_p_ry;
-            results[2][l] = bob_p_rz;
-            results[3][l] = tail_p_rz;
+            result_0[l] = bob_p_rx;
+            result_1[l] = bob_p_ry;
+            result_2[l] = bob_p_rz;
+            result_3[l] = tail_p_rz;
         }
-        p.give_pair(0, [&results[0], &results[1]]);
-        p.give_pair(2, [&results[2], &results[3]]);
+        p.give_pair(0, [&result_0, &result_1]);
+        p.give_pair(2, [&result_2, &result_3]);
     }
 
     /// Kinetic and potential energy, J.
@@ -459,25 +490,33 @@ impl SphericalPendulum {
             angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
-        for l in 0..LANES { given[0][l] = q.get(0, l); }
-        for l in 0..LANES { given[1][l] = q.get(1, l); }
-        for l in 0..LANES { given[2][l] = q.get(2, l); }
-        for l in 0..LANES { given[3][l] = q.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(0, l); }
-        for l in 0..LANES { given[5][l] = p.get(1, l); }
-        for l in 0..LANES { given[6][l] = p.get(2, l); }
-        for l in 0..LANES { given[7][l] = p.get(3, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(0, l); }
+        for l in 0..LANES { given_1[l] = q.get(1, l); }
+        for l in 0..LANES { given_2[l] = q.get(2, l); }
+        for l in 0..LANES { given_3[l] = q.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(0, l); }
+        for l in 0..LANES { given_5[l] = p.get(1, l); }
+        for l in 0..LANES { given_6[l] = p.get(2, l); }
+        for l in 0..LANES { given_7[l] = p.get(3, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let q_0 = given[0][l];
-            let q_1 = given[1][l];
-            let q_2 = given[2][l];
-            let q_3 = given[3][l];
-            let p_0 = given[4][l];
-            let p_1 = given[5][l];
-            let p_2 = given[6][l];
-            let p_3 = given[7][l];
+            let q_0 = given_0[l];
+            let q_1 = given_1[l];
+            let q_2 = given_2[l];
+            let q_3 = given_3[l];
+            let p_0 = given_4[l];
+            let p_1 = given_5[l];
+            let p_2 = given_6[l];
+            let p_3 = given_7[l];
             // bob: sine and cosine, rotation
             let bob_t0 = q_0 + q_0;
             let bob_t1 = q_1 + q_1;
@@ -562,10 +601,10 @@ impl SphericalPendulum {
             let bob_t23 = bob_t22 + 3.4;
             // ground: energy
             let energy_1 = 9.81 * bob_t23;
-            results[0][l] = energy_0;
-            results[1][l] = energy_1;
+            result_0[l] = energy_0;
+            result_1[l] = energy_1;
         }
-        energy.give_pair(0, [&results[0], &results[1]]);
+        energy.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
@@ -584,33 +623,47 @@ impl SphericalPendulum {
             angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
-        for l in 0..LANES { given[0][l] = q.get(0, l); }
-        for l in 0..LANES { given[1][l] = q.get(1, l); }
-        for l in 0..LANES { given[2][l] = q.get(2, l); }
-        for l in 0..LANES { given[3][l] = q.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(0, l); }
-        for l in 0..LANES { given[5][l] = v.get(1, l); }
-        for l in 0..LANES { given[6][l] = v.get(2, l); }
-        for l in 0..LANES { given[7][l] = v.get(3, l); }
-        for l in 0..LANES { given[8][l] = tau.get(0, l); }
-        for l in 0..LANES { given[9][l] = tau.get(1, l); }
-        for l in 0..LANES { given[10][l] = tau.get(2, l); }
-        for l in 0..LANES { given[11][l] = tau.get(3, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(0, l); }
+        for l in 0..LANES { given_1[l] = q.get(1, l); }
+        for l in 0..LANES { given_2[l] = q.get(2, l); }
+        for l in 0..LANES { given_3[l] = q.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(0, l); }
+        for l in 0..LANES { given_5[l] = v.get(1, l); }
+        for l in 0..LANES { given_6[l] = v.get(2, l); }
+        for l in 0..LANES { given_7[l] = v.get(3, l); }
+        for l in 0..LANES { given_8[l] = tau.get(0, l); }
+        for l in 0..LANES { given_9[l] = tau.get(1, l); }
+        for l in 0..LANES { given_10[l] = tau.get(2, l); }
+        for l in 0..LANES { given_11[l] = tau.get(3, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let q_0 = given[0][l];
-            let q_1 = given[1][l];
-            let q_2 = given[2][l];
-            let q_3 = given[3][l];
-            let v_0 = given[4][l];
-            let v_1 = given[5][l];
-            let v_2 = given[6][l];
-            let v_3 = given[7][l];
-            let tau_0 = given[8][l];
-            let tau_1 = given[9][l];
-            let tau_2 = given[10][l];
-            let tau_3 = given[11][l];
+            let q_0 = given_0[l];
+            let q_1 = given_1[l];
+            let q_2 = given_2[l];
+            let q_3 = given_3[l];
+            let v_0 = given_4[l];
+            let v_1 = given_5[l];
+            let v_2 = given_6[l];
+            let v_3 = given_7[l];
+            let tau_0 = given_8[l];
+            let tau_1 = given_9[l];
+            let tau_2 = given_10[l];
+            let tau_3 = given_11[l];
             // bob: sine and cosine, rotation
             let bob_t0 = q_0 + q_0;
             let bob_t1 = q_1 + q_1;
@@ -765,13 +818,13 @@ impl SphericalPendulum {
             let tail_t63 = tail_minus_k_x * tail_hatd_x;
             let tail_omegad_rz = tail_e + tail_t63;
             let tail_a = bob_minus_e + tail_omegad_rz;
-            results[0][l] = bob_a;
-            results[1][l] = -bob_minus_e;
-            results[2][l] = -bob_minus_e_2;
-            results[3][l] = tail_a;
+            result_0[l] = bob_a;
+            result_1[l] = -bob_minus_e;
+            result_2[l] = -bob_minus_e_2;
+            result_3[l] = tail_a;
         }
-        a.give_pair(0, [&results[0], &results[1]]);
-        a.give_pair(2, [&results[2], &results[3]]);
+        a.give_pair(0, [&result_0, &result_1]);
+        a.give_pair(2, [&result_2, &result_3]);
     }
 
     /// Wrench `[force; moment]` that each joint transmits to its child, in the child's body frame, N and N m.
@@ -790,33 +843,55 @@ impl SphericalPendulum {
             angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
-        for l in 0..LANES { given[0][l] = q.get(0, l); }
-        for l in 0..LANES { given[1][l] = q.get(1, l); }
-        for l in 0..LANES { given[2][l] = q.get(2, l); }
-        for l in 0..LANES { given[3][l] = q.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(0, l); }
-        for l in 0..LANES { given[5][l] = v.get(1, l); }
-        for l in 0..LANES { given[6][l] = v.get(2, l); }
-        for l in 0..LANES { given[7][l] = v.get(3, l); }
-        for l in 0..LANES { given[8][l] = tau.get(0, l); }
-        for l in 0..LANES { given[9][l] = tau.get(1, l); }
-        for l in 0..LANES { given[10][l] = tau.get(2, l); }
-        for l in 0..LANES { given[11][l] = tau.get(3, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(0, l); }
+        for l in 0..LANES { given_1[l] = q.get(1, l); }
+        for l in 0..LANES { given_2[l] = q.get(2, l); }
+        for l in 0..LANES { given_3[l] = q.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(0, l); }
+        for l in 0..LANES { given_5[l] = v.get(1, l); }
+        for l in 0..LANES { given_6[l] = v.get(2, l); }
+        for l in 0..LANES { given_7[l] = v.get(3, l); }
+        for l in 0..LANES { given_8[l] = tau.get(0, l); }
+        for l in 0..LANES { given_9[l] = tau.get(1, l); }
+        for l in 0..LANES { given_10[l] = tau.get(2, l); }
+        for l in 0..LANES { given_11[l] = tau.get(3, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
         for l in 0..LANES {
-            let q_0 = given[0][l];
-            let q_1 = given[1][l];
-            let q_2 = given[2][l];
-            let q_3 = given[3][l];
-            let v_0 = given[4][l];
-            let v_1 = given[5][l];
-            let v_2 = given[6][l];
-            let v_3 = given[7][l];
-            let tau_0 = given[8][l];
-            let tau_1 = given[9][l];
-            let tau_2 = given[10][l];
-            let tau_3 = given[11][l];
+            let q_0 = given_0[l];
+            let q_1 = given_1[l];
+            let q_2 = given_2[l];
+            let q_3 = given_3[l];
+            let v_0 = given_4[l];
+            let v_1 = given_5[l];
+            let v_2 = given_6[l];
+            let v_3 = given_7[l];
+            let tau_0 = given_8[l];
+            let tau_1 = given_9[l];
+            let tau_2 = given_10[l];
+            let tau_3 = given_11[l];
             // bob: sine and cosine, rotation
             let bob_t0 = q_0 + q_0;
             let bob_t1 = q_1 + q_1;
@@ -1080,25 +1155,25 @@ impl SphericalPendulum {
             let tail_t120 = 0.9950371902099892 * tail_minus_f_rx;
             let tail_t121 = 0.09950371902099892 * tail_minus_f_ry_2;
             let reactions_1_5 = tail_t120 + tail_t121;
-            results[0][l] = reactions_0_0;
-            results[1][l] = reactions_0_1;
-            results[2][l] = reactions_0_2;
-            results[3][l] = reactions_0_3;
-            results[4][l] = -minus_reactions_0_4;
-            results[5][l] = reactions_0_5;
-            results[6][l] = -minus_reactions_1_0;
-            results[7][l] = tail_f_z_2;
-            results[8][l] = reactions_1_2;
-            results[9][l] = reactions_1_3;
-            results[10][l] = -tail_minus_f_rz_2;
-            results[11][l] = reactions_1_5;
+            result_0[l] = reactions_0_0;
+            result_1[l] = reactions_0_1;
+            result_2[l] = reactions_0_2;
+            result_3[l] = reactions_0_3;
+            result_4[l] = -minus_reactions_0_4;
+            result_5[l] = reactions_0_5;
+            result_6[l] = -minus_reactions_1_0;
+            result_7[l] = tail_f_z_2;
+            result_8[l] = reactions_1_2;
+            result_9[l] = reactions_1_3;
+            result_10[l] = -tail_minus_f_rz_2;
+            result_11[l] = reactions_1_5;
         }
-        reactions.give_pair(0, [&results[0], &results[1]]);
-        reactions.give_pair(2, [&results[2], &results[3]]);
-        reactions.give_pair(4, [&results[4], &results[5]]);
-        reactions.give_pair(6, [&results[6], &results[7]]);
-        reactions.give_pair(8, [&results[8], &results[9]]);
-        reactions.give_pair(10, [&results[10], &results[11]]);
+        reactions.give_pair(0, [&result_0, &result_1]);
+        reactions.give_pair(2, [&result_2, &result_3]);
+        reactions.give_pair(4, [&result_4, &result_5]);
+        reactions.give_pair(6, [&result_6, &result_7]);
+        reactions.give_pair(8, [&result_8, &result_9]);
+        reactions.give_pair(10, [&result_10, &result_11]);
     }
 
     /// Mass matrix, by rows.
@@ -1117,7 +1192,22 @@ impl SphericalPendulum {
             angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 16]);
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
         for l in 0..LANES {
             // tail: sine and cosine, rotation
             let tail_sin = sines[0][l];
@@ -1147,31 +1237,31 @@ impl SphericalPendulum {
             let m_0_0 = tail_t18 + 0.6101920792079208;
             let m_1_1 = 0.5770000000000001 - tail_t19;
             let m_2_2 = 0.0401920792079208 - tail_t14;
-            results[0][l] = m_0_0;
-            results[1][l] = 0.0;
-            results[2][l] = m_0_2;
-            results[3][l] = 0.0;
-            results[4][l] = 0.0;
-            results[5][l] = m_1_1;
-            results[6][l] = 0.0;
-            results[7][l] = m_1_3;
-            results[8][l] = m_0_2;
-            results[9][l] = 0.0;
-            results[10][l] = m_2_2;
-            results[11][l] = 0.0;
-            results[12][l] = 0.0;
-            results[13][l] = m_1_3;
-            results[14][l] = 0.0;
-            results[15][l] = 0.027700000000000002;
+            result_0[l] = m_0_0;
+            result_1[l] = 0.0;
+            result_2[l] = m_0_2;
+            result_3[l] = 0.0;
+            result_4[l] = 0.0;
+            result_5[l] = m_1_1;
+            result_6[l] = 0.0;
+            result_7[l] = m_1_3;
+            result_8[l] = m_0_2;
+            result_9[l] = 0.0;
+            result_10[l] = m_2_2;
+            result_11[l] = 0.0;
+            result_12[l] = 0.0;
+            result_13[l] = m_1_3;
+            result_14[l] = 0.0;
+            result_15[l] = 0.027700000000000002;
         }
-        m.give_pair(0, [&results[0], &results[1]]);
-        m.give_pair(2, [&results[2], &results[3]]);
-        m.give_pair(4, [&results[4], &results[5]]);
-        m.give_pair(6, [&results[6], &results[7]]);
-        m.give_pair(8, [&results[8], &results[9]]);
-        m.give_pair(10, [&results[10], &results[11]]);
-        m.give_pair(12, [&results[12], &results[13]]);
-        m.give_pair(14, [&results[14], &results[15]]);
+        m.give_pair(0, [&result_0, &result_1]);
+        m.give_pair(2, [&result_2, &result_3]);
+        m.give_pair(4, [&result_4, &result_5]);
+        m.give_pair(6, [&result_6, &result_7]);
+        m.give_pair(8, [&result_8, &result_9]);
+        m.give_pair(10, [&result_10, &result_11]);
+        m.give_pair(12, [&result_12, &result_13]);
+        m.give_pair(14, [&result_14, &result_15]);
     }
 
     /// Rotation, position and velocity of frames. The rotation takes components in the frame's axes to ground axes; the
@@ -1192,25 +1282,67 @@ impl SphericalPendulum {
             angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
-        for l in 0..LANES { given[0][l] = q.get(0, l); }
-        for l in 0..LANES { given[1][l] = q.get(1, l); }
-        for l in 0..LANES { given[2][l] = q.get(2, l); }
-        for l in 0..LANES { given[3][l] = q.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(0, l); }
-        for l in 0..LANES { given[5][l] = v.get(1, l); }
-        for l in 0..LANES { given[6][l] = v.get(2, l); }
-        for l in 0..LANES { given[7][l] = v.get(3, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 36]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(0, l); }
+        for l in 0..LANES { given_1[l] = q.get(1, l); }
+        for l in 0..LANES { given_2[l] = q.get(2, l); }
+        for l in 0..LANES { given_3[l] = q.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(0, l); }
+        for l in 0..LANES { given_5[l] = v.get(1, l); }
+        for l in 0..LANES { given_6[l] = v.get(2, l); }
+        for l in 0..LANES { given_7[l] = v.get(3, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
+        let mut result_18 = [0.0; LANES];
+        let mut result_19 = [0.0; LANES];
+        let mut result_20 = [0.0; LANES];
+        let mut result_21 = [0.0; LANES];
+        let mut result_22 = [0.0; LANES];
+        let mut result_23 = [0.0; LANES];
+        let mut result_24 = [0.0; LANES];
+        let mut result_25 = [0.0; LANES];
+        let mut result_26 = [0.0; LANES];
+        let mut result_27 = [0.0; LANES];
+        let mut result_28 = [0.0; LANES];
+        let mut result_29 = [0.0; LANES];
+        let mut result_30 = [0.0; LANES];
+        let mut result_31 = [0.0; LANES];
+        let mut result_32 = [0.0; LANES];
+        let mut result_33 = [0.0; LANES];
+        let mut result_34 = [0.0; LANES];
+        let mut result_35 = [0.0; LANES];
         for l in 0..LANES {
-            let q_0 = given[0][l];
-            let q_1 = given[1][l];
-            let q_2 = given[2][l];
-            let q_3 = given[3][l];
-            let v_0 = given[4][l];
-            let v_1 = given[5][l];
-            let v_2 = given[6][l];
-            let v_3 = given[7][l];
+            let q_0 = given_0[l];
+            let q_1 = given_1[l];
+            let q_2 = given_2[l];
+            let q_3 = given_3[l];
+            let v_0 = given_4[l];
+            let v_1 = given_5[l];
+            let v_2 = given_6[l];
+            let v_3 = given_7[l];
             // bob: sine and cosine, rotation
             let bob_t0 = q_0 + q_0;
             let bob_t1 = q_1 + q_1;
@@ -1304,61 +1436,61 @@ impl SphericalPendulum {
             let tail_t43 = 0.9950371902099892 * tail_hat_rx;
             let tail_t44 = 0.09950371902099892 * tail_minus_hat_ry;
             let velocity_1_5 = tail_t44 - tail_t43;
-            results[0][l] = -minus_rotation_0_0;
-            results[1][l] = rotation_0_1;
-            results[2][l] = rotation_0_2;
-            results[3][l] = rotation_1_0;
-            results[4][l] = rotation_1_1;
-            results[5][l] = rotation_1_2;
-            results[6][l] = rotation_2_0;
-            results[7][l] = rotation_2_1;
-            results[8][l] = -minus_rotation_2_2;
-            results[9][l] = rotation_3_0;
-            results[10][l] = rotation_0_1;
-            results[11][l] = rotation_3_2;
-            results[12][l] = rotation_4_0;
-            results[13][l] = rotation_1_1;
-            results[14][l] = rotation_4_2;
-            results[15][l] = rotation_5_0;
-            results[16][l] = rotation_2_1;
-            results[17][l] = -minus_rotation_5_2;
-            results[18][l] = 0.0;
-            results[19][l] = 0.0;
-            results[20][l] = 2.0;
-            results[21][l] = -minus_position_1_0;
-            results[22][l] = -minus_position_1_1;
-            results[23][l] = position_1_2;
-            results[24][l] = 0.0;
-            results[25][l] = 0.0;
-            results[26][l] = 0.0;
-            results[27][l] = v_0;
-            results[28][l] = v_1;
-            results[29][l] = v_2;
-            results[30][l] = -minus_velocity_1_0;
-            results[31][l] = tail_hat_z;
-            results[32][l] = velocity_1_2;
-            results[33][l] = velocity_1_3;
-            results[34][l] = tail_omega_rz;
-            results[35][l] = velocity_1_5;
+            result_0[l] = -minus_rotation_0_0;
+            result_1[l] = rotation_0_1;
+            result_2[l] = rotation_0_2;
+            result_3[l] = rotation_1_0;
+            result_4[l] = rotation_1_1;
+            result_5[l] = rotation_1_2;
+            result_6[l] = rotation_2_0;
+            result_7[l] = rotation_2_1;
+            result_8[l] = -minus_rotation_2_2;
+            result_9[l] = rotation_3_0;
+            result_10[l] = rotation_0_1;
+            result_11[l] = rotation_3_2;
+            result_12[l] = rotation_4_0;
+            result_13[l] = rotation_1_1;
+            result_14[l] = rotation_4_2;
+            result_15[l] = rotation_5_0;
+            result_16[l] = rotation_2_1;
+            result_17[l] = -minus_rotation_5_2;
+            result_18[l] = 0.0;
+            result_19[l] = 0.0;
+            result_20[l] = 2.0;
+            result_21[l] = -minus_position_1_0;
+            result_22[l] = -minus_position_1_1;
+            result_23[l] = position_1_2;
+            result_24[l] = 0.0;
+            result_25[l] = 0.0;
+            result_26[l] = 0.0;
+            result_27[l] = v_0;
+            result_28[l] = v_1;
+            result_29[l] = v_2;
+            result_30[l] = -minus_velocity_1_0;
+            result_31[l] = tail_hat_z;
+            result_32[l] = velocity_1_2;
+            result_33[l] = velocity_1_3;
+            result_34[l] = tail_omega_rz;
+            result_35[l] = velocity_1_5;
         }
-        rotation.give_pair(0, [&results[0], &results[1]]);
-        rotation.give_pair(2, [&results[2], &results[3]]);
-        rotation.give_pair(4, [&results[4], &results[5]]);
-        rotation.give_pair(6, [&results[6], &results[7]]);
-        rotation.give_pair(8, [&results[8], &results[9]]);
-        rotation.give_pair(10, [&results[10], &results[11]]);
-        rotation.give_pair(12, [&results[12], &results[13]]);
-        rotation.give_pair(14, [&results[14], &results[15]]);
-        rotation.give_pair(16, [&results[16], &results[17]]);
-        position.give_pair(0, [&results[18], &results[19]]);
-        position.give_pair(2, [&results[20], &results[21]]);
-        position.give_pair(4, [&results[22], &results[23]]);
-        velocity.give_pair(0, [&results[24], &results[25]]);
-        velocity.give_pair(2, [&results[26], &results[27]]);
-        velocity.give_pair(4, [&results[28], &results[29]]);
-        velocity.give_pair(6, [&results[30], &results[31]]);
-        velocity.give_pair(8, [&results[32], &results[33]]);
-        velocity.give_pair(10, [&results[34], &results[35]]);
+        rotation.give_pair(0, [&result_0, &result_1]);
+        rotation.give_pair(2, [&result_2, &result_3]);
+        rotation.give_pair(4, [&result_4, &result_5]);
+        rotation.give_pair(6, [&result_6, &result_7]);
+        rotation.give_pair(8, [&result_8, &result_9]);
+        rotation.give_pair(10, [&result_10, &result_11]);
+        rotation.give_pair(12, [&result_12, &result_13]);
+        rotation.give_pair(14, [&result_14, &result_15]);
+        rotation.give_pair(16, [&result_16, &result_17]);
+        position.give_pair(0, [&result_18, &result_19]);
+        position.give_pair(2, [&result_20, &result_21]);
+        position.give_pair(4, [&result_22, &result_23]);
+        velocity.give_pair(0, [&result_24, &result_25]);
+        velocity.give_pair(2, [&result_26, &result_27]);
+        velocity.give_pair(4, [&result_28, &result_29]);
+        velocity.give_pair(6, [&result_30, &result_31]);
+        velocity.give_pair(8, [&result_32, &result_33]);
+        velocity.give_pair(10, [&result_34, &result_35]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`.
@@ -1378,33 +1510,47 @@ impl SphericalPendulum {
             angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
-        for l in 0..LANES { given[0][l] = q.get(0, l); }
-        for l in 0..LANES { given[1][l] = q.get(1, l); }
-        for l in 0..LANES { given[2][l] = q.get(2, l); }
-        for l in 0..LANES { given[3][l] = q.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(0, l); }
-        for l in 0..LANES { given[5][l] = v.get(1, l); }
-        for l in 0..LANES { given[6][l] = v.get(2, l); }
-        for l in 0..LANES { given[7][l] = v.get(3, l); }
-        for l in 0..LANES { given[8][l] = a.get(0, l); }
-        for l in 0..LANES { given[9][l] = a.get(1, l); }
-        for l in 0..LANES { given[10][l] = a.get(2, l); }
-        for l in 0..LANES { given[11][l] = a.get(3, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(0, l); }
+        for l in 0..LANES { given_1[l] = q.get(1, l); }
+        for l in 0..LANES { given_2[l] = q.get(2, l); }
+        for l in 0..LANES { given_3[l] = q.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(0, l); }
+        for l in 0..LANES { given_5[l] = v.get(1, l); }
+        for l in 0..LANES { given_6[l] = v.get(2, l); }
+        for l in 0..LANES { given_7[l] = v.get(3, l); }
+        for l in 0..LANES { given_8[l] = a.get(0, l); }
+        for l in 0..LANES { given_9[l] = a.get(1, l); }
+        for l in 0..LANES { given_10[l] = a.get(2, l); }
+        for l in 0..LANES { given_11[l] = a.get(3, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let q_0 = given[0][l];
-            let q_1 = given[1][l];
-            let q_2 = given[2][l];
-            let q_3 = given[3][l];
-            let v_0 = given[4][l];
-            let v_1 = given[5][l];
-            let v_2 = given[6][l];
-            let v_3 = given[7][l];
-            let a_0 = given[8][l];
-            let a_1 = given[9][l];
-            let a_2 = given[10][l];
-            let a_3 = given[11][l];
+            let q_0 = given_0[l];
+            let q_1 = given_1[l];
+            let q_2 = given_2[l];
+            let q_3 = given_3[l];
+            let v_0 = given_4[l];
+            let v_1 = given_5[l];
+            let v_2 = given_6[l];
+            let v_3 = given_7[l];
+            let a_0 = given_8[l];
+            let a_1 = given_9[l];
+            let a_2 = given_10[l];
+            let a_3 = given_11[l];
             // bob: sine and cosine, rotation
             let bob_t0 = q_0 + q_0;
             let bob_t1 = q_1 + q_1;
@@ -1525,13 +1671,13 @@ impl SphericalPendulum {
             let tau_0 = bob_f_rx - tail_t62;
             let tau_1 = bob_f_ry + tail_t64;
             let tau_2 = bob_f_rz + tail_t60;
-            results[0][l] = tau_0;
-            results[1][l] = tau_1;
-            results[2][l] = tau_2;
-            results[3][l] = tail_f_rz;
+            result_0[l] = tau_0;
+            result_1[l] = tau_1;
+            result_2[l] = tau_2;
+            result_3[l] = tail_f_rz;
         }
-        tau.give_pair(0, [&results[0], &results[1]]);
-        tau.give_pair(2, [&results[2], &results[3]]);
+        tau.give_pair(0, [&result_0, &result_1]);
+        tau.give_pair(2, [&result_2, &result_3]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`.
@@ -1551,25 +1697,35 @@ impl SphericalPendulum {
             angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
-        for l in 0..LANES { given[0][l] = q.get(0, l); }
-        for l in 0..LANES { given[1][l] = q.get(1, l); }
-        for l in 0..LANES { given[2][l] = q.get(2, l); }
-        for l in 0..LANES { given[3][l] = q.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(0, l); }
-        for l in 0..LANES { given[5][l] = v.get(1, l); }
-        for l in 0..LANES { given[6][l] = v.get(2, l); }
-        for l in 0..LANES { given[7][l] = v.get(3, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(0, l); }
+        for l in 0..LANES { given_1[l] = q.get(1, l); }
+        for l in 0..LANES { given_2[l] = q.get(2, l); }
+        for l in 0..LANES { given_3[l] = q.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(0, l); }
+        for l in 0..LANES { given_5[l] = v.get(1, l); }
+        for l in 0..LANES { given_6[l] = v.get(2, l); }
+        for l in 0..LANES { given_7[l] = v.get(3, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
         for l in 0..LANES {
-            let q_0 = given[0][l];
-            let q_1 = given[1][l];
-            let q_2 = given[2][l];
-            let q_3 = given[3][l];
-            let v_0 = given[4][l];
-            let v_1 = given[5][l];
-            let v_2 = given[6][l];
-            let v_3 = given[7][l];
+            let q_0 = given_0[l];
+            let q_1 = given_1[l];
+            let q_2 = given_2[l];
+            let q_3 = given_3[l];
+            let v_0 = given_4[l];
+            let v_1 = given_5[l];
+            let v_2 = given_6[l];
+            let v_3 = given_7[l];
             // bob: sine and cosine, rotation
             let bob_t0 = q_0 + q_0;
             let bob_t1 = q_1 + q_1;
@@ -1670,13 +1826,13 @@ impl SphericalPendulum {
             let h_0 = tail_t49 - bob_minus_f_rx;
             let h_1 = bob_f_ry - tail_t51;
             let minus_h_2 = bob_minus_f_rz + tail_t47;
-            results[0][l] = h_0;
-            results[1][l] = h_1;
-            results[2][l] = -minus_h_2;
-            results[3][l] = -tail_minus_f_rz;
+            result_0[l] = h_0;
+            result_1[l] = h_1;
+            result_2[l] = -minus_h_2;
+            result_3[l] = -tail_minus_f_rz;
         }
-        h.give_pair(0, [&results[0], &results[1]]);
-        h.give_pair(2, [&results[2], &results[3]]);
+        h.give_pair(0, [&result_0, &result_1]);
+        h.give_pair(2, [&result_2, &result_3]);
     }
 
     /// Jacobians `J` of frames.
@@ -1696,7 +1852,54 @@ impl SphericalPendulum {
             angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 48]);
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
+        let mut result_18 = [0.0; LANES];
+        let mut result_19 = [0.0; LANES];
+        let mut result_20 = [0.0; LANES];
+        let mut result_21 = [0.0; LANES];
+        let mut result_22 = [0.0; LANES];
+        let mut result_23 = [0.0; LANES];
+        let mut result_24 = [0.0; LANES];
+        let mut result_25 = [0.0; LANES];
+        let mut result_26 = [0.0; LANES];
+        let mut result_27 = [0.0; LANES];
+        let mut result_28 = [0.0; LANES];
+        let mut result_29 = [0.0; LANES];
+        let mut result_30 = [0.0; LANES];
+        let mut result_31 = [0.0; LANES];
+        let mut result_32 = [0.0; LANES];
+        let mut result_33 = [0.0; LANES];
+        let mut result_34 = [0.0; LANES];
+        let mut result_35 = [0.0; LANES];
+        let mut result_36 = [0.0; LANES];
+        let mut result_37 = [0.0; LANES];
+        let mut result_38 = [0.0; LANES];
+        let mut result_39 = [0.0; LANES];
+        let mut result_40 = [0.0; LANES];
+        let mut result_41 = [0.0; LANES];
+        let mut result_42 = [0.0; LANES];
+        let mut result_43 = [0.0; LANES];
+        let mut result_44 = [0.0; LANES];
+        let mut result_45 = [0.0; LANES];
+        let mut result_46 = [0.0; LANES];
+        let mut result_47 = [0.0; LANES];
         for l in 0..LANES {
             // tail: sine and cosine, rotation
             let tail_sin = sines[0][l];
@@ -1711,79 +1914,79 @@ impl SphericalPendulum {
             // bob: Jacobian
             let minus_jacobian_6_1 = 0.8 * jacobian_9_0;
             let minus_jacobian_8_1 = 0.8 * minus_jacobian_9_2;
-            results[0][l] = 0.0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = 0.0;
-            results[4][l] = 0.0;
-            results[5][l] = 0.0;
-            results[6][l] = 0.0;
-            results[7][l] = 0.0;
-            results[8][l] = 0.0;
-            results[9][l] = 0.0;
-            results[10][l] = 0.0;
-            results[11][l] = 0.0;
-            results[12][l] = 1.0;
-            results[13][l] = 0.0;
-            results[14][l] = 0.0;
-            results[15][l] = 0.0;
-            results[16][l] = 0.0;
-            results[17][l] = 1.0;
-            results[18][l] = 0.0;
-            results[19][l] = 0.0;
-            results[20][l] = 0.0;
-            results[21][l] = 0.0;
-            results[22][l] = 1.0;
-            results[23][l] = 0.0;
-            results[24][l] = 0.0;
-            results[25][l] = -minus_jacobian_6_1;
-            results[26][l] = 0.0;
-            results[27][l] = 0.0;
-            results[28][l] = 0.8;
-            results[29][l] = 0.0;
-            results[30][l] = 0.0;
-            results[31][l] = 0.0;
-            results[32][l] = 0.0;
-            results[33][l] = -minus_jacobian_8_1;
-            results[34][l] = 0.0;
-            results[35][l] = 0.0;
-            results[36][l] = jacobian_9_0;
-            results[37][l] = 0.0;
-            results[38][l] = -minus_jacobian_9_2;
-            results[39][l] = 0.0;
-            results[40][l] = 0.0;
-            results[41][l] = 1.0;
-            results[42][l] = 0.0;
-            results[43][l] = 1.0;
-            results[44][l] = minus_jacobian_9_2;
-            results[45][l] = 0.0;
-            results[46][l] = jacobian_9_0;
-            results[47][l] = 0.0;
+            result_0[l] = 0.0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = 0.0;
+            result_4[l] = 0.0;
+            result_5[l] = 0.0;
+            result_6[l] = 0.0;
+            result_7[l] = 0.0;
+            result_8[l] = 0.0;
+            result_9[l] = 0.0;
+            result_10[l] = 0.0;
+            result_11[l] = 0.0;
+            result_12[l] = 1.0;
+            result_13[l] = 0.0;
+            result_14[l] = 0.0;
+            result_15[l] = 0.0;
+            result_16[l] = 0.0;
+            result_17[l] = 1.0;
+            result_18[l] = 0.0;
+            result_19[l] = 0.0;
+            result_20[l] = 0.0;
+            result_21[l] = 0.0;
+            result_22[l] = 1.0;
+            result_23[l] = 0.0;
+            result_24[l] = 0.0;
+            result_25[l] = -minus_jacobian_6_1;
+            result_26[l] = 0.0;
+            result_27[l] = 0.0;
+            result_28[l] = 0.8;
+            result_29[l] = 0.0;
+            result_30[l] = 0.0;
+            result_31[l] = 0.0;
+            result_32[l] = 0.0;
+            result_33[l] = -minus_jacobian_8_1;
+            result_34[l] = 0.0;
+            result_35[l] = 0.0;
+            result_36[l] = jacobian_9_0;
+            result_37[l] = 0.0;
+            result_38[l] = -minus_jacobian_9_2;
+            result_39[l] = 0.0;
+            result_40[l] = 0.0;
+            result_41[l] = 1.0;
+            result_42[l] = 0.0;
+            result_43[l] = 1.0;
+            result_44[l] = minus_jacobian_9_2;
+            result_45[l] = 0.0;
+            result_46[l] = jacobian_9_0;
+            result_47[l] = 0.0;
         }
-        jacobian.give_pair(0, [&results[0], &results[1]]);
-        jacobian.give_pair(2, [&results[2], &results[3]]);
-        jacobian.give_pair(4, [&results[4], &results[5]]);
-        jacobian.give_pair(6, [&results[6], &results[7]]);
-        jacobian.give_pair(8, [&results[8], &results[9]]);
-        jacobian.give_pair(10, [&results[10], &results[11]]);
-        jacobian.give_pair(12, [&results[12], &results[13]]);
-        jacobian.give_pair(14, [&results[14], &results[15]]);
-        jacobian.give_pair(16, [&results[16], &results[17]]);
-        jacobian.give_pair(18, [&results[18], &results[19]]);
-        jacobian.give_pair(20, [&results[20], &results[21]]);
-        jacobian.give_pair(22, [&results[22], &results[23]]);
-        jacobian.give_pair(24, [&results[24], &results[25]]);
-        jacobian.give_pair(26, [&results[26], &results[27]]);
-        jacobian.give_pair(28, [&results[28], &results[29]]);
-        jacobian.give_pair(30, [&results[30], &results[31]]);
-        jacobian.give_pair(32, [&results[32], &results[33]]);
-        jacobian.give_pair(34, [&results[34], &results[35]]);
-        jacobian.give_pair(36, [&results[36], &results[37]]);
-        jacobian.give_pair(38, [&results[38], &results[39]]);
-        jacobian.give_pair(40, [&results[40], &results[41]]);
-        jacobian.give_pair(42, [&results[42], &results[43]]);
-        jacobian.give_pair(44, [&results[44], &results[45]]);
-        jacobian.give_pair(46, [&results[46], &results[47]]);
+        jacobian.give_pair(0, [&result_0, &result_1]);
+        jacobian.give_pair(2, [&result_2, &result_3]);
+        jacobian.give_pair(4, [&result_4, &result_5]);
+        jacobian.give_pair(6, [&result_6, &result_7]);
+        jacobian.give_pair(8, [&result_8, &result_9]);
+        jacobian.give_pair(10, [&result_10, &result_11]);
+        jacobian.give_pair(12, [&result_12, &result_13]);
+        jacobian.give_pair(14, [&result_14, &result_15]);
+        jacobian.give_pair(16, [&result_16, &result_17]);
+        jacobian.give_pair(18, [&result_18, &result_19]);
+        jacobian.give_pair(20, [&result_20, &result_21]);
+        jacobian.give_pair(22, [&result_22, &result_23]);
+        jacobian.give_pair(24, [&result_24, &result_25]);
+        jacobian.give_pair(26, [&result_26, &result_27]);
+        jacobian.give_pair(28, [&result_28, &result_29]);
+        jacobian.give_pair(30, [&result_30, &result_31]);
+        jacobian.give_pair(32, [&result_32, &result_33]);
+        jacobian.give_pair(34, [&result_34, &result_35]);
+        jacobian.give_pair(36, [&result_36, &result_37]);
+        jacobian.give_pair(38, [&result_38, &result_39]);
+        jacobian.give_pair(40, [&result_40, &result_41]);
+        jacobian.give_pair(42, [&result_42, &result_43]);
+        jacobian.give_pair(44, [&result_44, &result_45]);
+        jacobian.give_pair(46, [&result_46, &result_47]);
     }
 
     /// Bias accelerations `[linear; angular]` of frames, those at `v̇ = 0`, in the frame's axes.
@@ -1804,17 +2007,31 @@ impl SphericalPendulum {
             angles[0][l] = tail_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 4]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
             // tail: sine and cosine, rotation
             let tail_sin = sines[0][l];
             let tail_cos = cosines[0][l];
@@ -1854,25 +2071,25 @@ impl SphericalPendulum {
             let tail_t22 = 0.9950371902099892 * tail_minus_accel_x;
             let tail_t23 = 0.09950371902099892 * tail_minus_accel_y;
             let bias_1_2 = tail_t22 + tail_t23;
-            results[0][l] = 0.0;
-            results[1][l] = 0.0;
-            results[2][l] = 0.0;
-            results[3][l] = 0.0;
-            results[4][l] = 0.0;
-            results[5][l] = 0.0;
-            results[6][l] = bias_1_0;
-            results[7][l] = -tail_minus_accel_z;
-            results[8][l] = bias_1_2;
-            results[9][l] = bias_1_3;
-            results[10][l] = 0.0;
-            results[11][l] = bias_1_5;
+            result_0[l] = 0.0;
+            result_1[l] = 0.0;
+            result_2[l] = 0.0;
+            result_3[l] = 0.0;
+            result_4[l] = 0.0;
+            result_5[l] = 0.0;
+            result_6[l] = bias_1_0;
+            result_7[l] = -tail_minus_accel_z;
+            result_8[l] = bias_1_2;
+            result_9[l] = bias_1_3;
+            result_10[l] = 0.0;
+            result_11[l] = bias_1_5;
         }
-        bias.give_pair(0, [&results[0], &results[1]]);
-        bias.give_pair(2, [&results[2], &results[3]]);
-        bias.give_pair(4, [&results[4], &results[5]]);
-        bias.give_pair(6, [&results[6], &results[7]]);
-        bias.give_pair(8, [&results[8], &results[9]]);
-        bias.give_pair(10, [&results[10], &results[11]]);
+        bias.give_pair(0, [&result_0, &result_1]);
+        bias.give_pair(2, [&result_2, &result_3]);
+        bias.give_pair(4, [&result_4, &result_5]);
+        bias.give_pair(6, [&result_6, &result_7]);
+        bias.give_pair(8, [&result_8, &result_9]);
+        bias.give_pair(10, [&result_10, &result_11]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -1884,25 +2101,36 @@ impl SphericalPendulum {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 8]);
-        for l in 0..LANES { given[0][l] = q.get(0, l); }
-        for l in 0..LANES { given[1][l] = q.get(1, l); }
-        for l in 0..LANES { given[2][l] = q.get(2, l); }
-        for l in 0..LANES { given[3][l] = q.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(0, l); }
-        for l in 0..LANES { given[5][l] = v.get(1, l); }
-        for l in 0..LANES { given[6][l] = v.get(2, l); }
-        for l in 0..LANES { given[7][l] = v.get(3, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = q.get(0, l); }
+        for l in 0..LANES { given_1[l] = q.get(1, l); }
+        for l in 0..LANES { given_2[l] = q.get(2, l); }
+        for l in 0..LANES { given_3[l] = q.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(0, l); }
+        for l in 0..LANES { given_5[l] = v.get(1, l); }
+        for l in 0..LANES { given_6[l] = v.get(2, l); }
+        for l in 0..LANES { given_7[l] = v.get(3, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
         for l in 0..LANES {
-            let q_0 = given[0][l];
-            let q_1 = given[1][l];
-            let q_2 = given[2][l];
-            let q_3 = given[3][l];
-            let v_0 = given[4][l];
-            let v_1 = given[5][l];
-            let v_2 = given[6][l];
-            let v_3 = given[7][l];
+            let q_0 = given_0[l];
+            let q_1 = given_1[l];
+            let q_2 = given_2[l];
+            let q_3 = given_3[l];
+            let v_0 = given_4[l];
+            let v_1 = given_5[l];
+            let v_2 = given_6[l];
+            let v_3 = given_7[l];
             // bob: coordinate rates
             let bob_t0 = q_1 * v_2;
             let bob_t1 = q_2 * v_1;
@@ -1928,15 +2156,15 @@ impl SphericalPendulum {
             let bob_t21 = q_2 * v_2;
             let bob_t22 = bob_t20 + bob_t21;
             let bob_t23 = 0.5 * bob_t22;
-            results[0][l] = bob_t11;
-            results[1][l] = bob_t14;
-            results[2][l] = bob_t17;
-            results[3][l] = -bob_t23;
-            results[4][l] = v_3;
+            result_0[l] = bob_t11;
+            result_1[l] = bob_t14;
+            result_2[l] = bob_t17;
+            result_3[l] = -bob_t23;
+            result_4[l] = v_3;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give(4, &results[4]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give(4, &result_4);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -95,33 +95,55 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(4, l); }
-        for l in 0..LANES { given[5][l] = p.get(5, l); }
-        for l in 0..LANES { given[6][l] = tau.get(0, l); }
-        for l in 0..LANES { given[7][l] = tau.get(1, l); }
-        for l in 0..LANES { given[8][l] = tau.get(2, l); }
-        for l in 0..LANES { given[9][l] = tau.get(3, l); }
-        for l in 0..LANES { given[10][l] = tau.get(4, l); }
-        for l in 0..LANES { given[11][l] = tau.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(4, l); }
+        for l in 0..LANES { given_5[l] = p.get(5, l); }
+        for l in 0..LANES { given_6[l] = tau.get(0, l); }
+        for l in 0..LANES { given_7[l] = tau.get(1, l); }
+        for l in 0..LANES { given_8[l] = tau.get(2, l); }
+        for l in 0..LANES { given_9[l] = tau.get(3, l); }
+        for l in 0..LANES { given_10[l] = tau.get(4, l); }
+        for l in 0..LANES { given_11[l] = tau.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
-            let p_2 = given[2][l];
-            let p_3 = given[3][l];
-            let p_4 = given[4][l];
-            let p_5 = given[5][l];
-            let tau_0 = given[6][l];
-            let tau_1 = given[7][l];
-            let tau_2 = given[8][l];
-            let tau_3 = given[9][l];
-            let tau_4 = given[10][l];
-            let tau_5 = given[11][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
+            let p_2 = given_2[l];
+            let p_3 = given_3[l];
+            let p_4 = given_4[l];
+            let p_5 = given_5[l];
+            let tau_0 = given_6[l];
+            let tau_1 = given_7[l];
+            let tau_2 = given_8[l];
+            let tau_3 = given_9[l];
+            let tau_4 = given_10[l];
+            let tau_5 = given_11[l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin = sines[0][l];
             let upper_arm_link_cos = cosines[0][l];
@@ -433,25 +455,25 @@ impl Ur5 {
             let pd_3 = tau_3 - wrist_1_link_t52;
             let pd_4 = tau_4 - wrist_2_link_t31;
             let pd_5 = tau_5 + wrist_3_link_t8;
-            results[0][l] = shoulder_link_v;
-            results[1][l] = upper_arm_link_v;
-            results[2][l] = forearm_link_v;
-            results[3][l] = wrist_1_link_v;
-            results[4][l] = wrist_2_link_v;
-            results[5][l] = wrist_3_link_v;
-            results[6][l] = tau_0;
-            results[7][l] = pd_1;
-            results[8][l] = pd_2;
-            results[9][l] = pd_3;
-            results[10][l] = pd_4;
-            results[11][l] = pd_5;
+            result_0[l] = shoulder_link_v;
+            result_1[l] = upper_arm_link_v;
+            result_2[l] = forearm_link_v;
+            result_3[l] = wrist_1_link_v;
+            result_4[l] = wrist_2_link_v;
+            result_5[l] = wrist_3_link_v;
+            result_6[l] = tau_0;
+            result_7[l] = pd_1;
+            result_8[l] = pd_2;
+            result_9[l] = pd_3;
+            result_10[l] = pd_4;
+            result_11[l] = pd_5;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
-        pd.give_pair(0, [&results[6], &results[7]]);
-        pd.give_pair(2, [&results[8], &results[9]]);
-        pd.give_pair(4, [&results[10], &results[11]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
+        pd.give_pair(0, [&result_6, &result_7]);
+        pd.give_pair(2, [&result_8, &result_9]);
+        pd.give_pair(4, [&result_10, &result_11]);
     }
 
     /// Velocities from momenta.
@@ -479,21 +501,31 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(4, l); }
-        for l in 0..LANES { given[5][l] = p.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(4, l); }
+        for l in 0..LANES { given_5[l] = p.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
-            let p_2 = given[2][l];
-            let p_3 = given[3][l];
-            let p_4 = given[4][l];
-            let p_5 = given[5][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
+            let p_2 = given_2[l];
+            let p_3 = given_3[l];
+            let p_4 = given_4[l];
+            let p_5 = given_5[l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin = sines[0][l];
             let upper_arm_link_cos = cosines[0][l];
@@ -697,16 +729,16 @@ impl Ur5 {
             let wrist_2_link_omega_ry = wrist_2_link_t14 - wrist_2_link_t15;
             // wrist_3_link: velocity and joint rate (4.40)
             let wrist_3_link_v = wrist_3_link_e - wrist_2_link_omega_ry;
-            results[0][l] = shoulder_link_v;
-            results[1][l] = upper_arm_link_v;
-            results[2][l] = forearm_link_v;
-            results[3][l] = wrist_1_link_v;
-            results[4][l] = wrist_2_link_v;
-            results[5][l] = wrist_3_link_v;
+            result_0[l] = shoulder_link_v;
+            result_1[l] = upper_arm_link_v;
+            result_2[l] = forearm_link_v;
+            result_3[l] = wrist_1_link_v;
+            result_4[l] = wrist_2_link_v;
+            result_5[l] = wrist_3_link_v;
         }
-        v.give_pair(0, [&results[0], &results[1]]);
-        v.give_pair(2, [&results[2], &results[3]]);
-        v.give_pair(4, [&results[4], &results[5]]);
+        v.give_pair(0, [&result_0, &result_1]);
+        v.give_pair(2, [&result_2, &result_3]);
+        v.give_pair(4, [&result_4, &result_5]);
     }
 
     /// Momenta from velocities: `p = M(q) v`.
@@ -734,21 +766,31 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin = sines[0][l];
             let upper_arm_link_cos = cosines[0][l];
@@ -892,16 +934,16 @@ impl Ur5 {
             let upper_arm_link_p_rz = upper_arm_link_t8 + forearm_link_t28;
             // upper_arm_link: momentum
             let shoulder_link_p_rz = shoulder_link_t0 - upper_arm_link_p_ry;
-            results[0][l] = shoulder_link_p_rz;
-            results[1][l] = upper_arm_link_p_rz;
-            results[2][l] = forearm_link_p_rz;
-            results[3][l] = wrist_1_link_p_rz;
-            results[4][l] = wrist_2_link_p_rz;
-            results[5][l] = wrist_3_link_p_rz;
+            result_0[l] = shoulder_link_p_rz;
+            result_1[l] = upper_arm_link_p_rz;
+            result_2[l] = forearm_link_p_rz;
+            result_3[l] = wrist_1_link_p_rz;
+            result_4[l] = wrist_2_link_p_rz;
+            result_5[l] = wrist_3_link_p_rz;
         }
-        p.give_pair(0, [&results[0], &results[1]]);
-        p.give_pair(2, [&results[2], &results[3]]);
-        p.give_pair(4, [&results[4], &results[5]]);
+        p.give_pair(0, [&result_0, &result_1]);
+        p.give_pair(2, [&result_2, &result_3]);
+        p.give_pair(4, [&result_4, &result_5]);
     }
 
     /// Kinetic and potential energy, J.
@@ -931,21 +973,27 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(4, l); }
-        for l in 0..LANES { given[5][l] = p.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(4, l); }
+        for l in 0..LANES { given_5[l] = p.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
-            let p_2 = given[2][l];
-            let p_3 = given[3][l];
-            let p_4 = given[4][l];
-            let p_5 = given[5][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
+            let p_2 = given_2[l];
+            let p_3 = given_3[l];
+            let p_4 = given_4[l];
+            let p_5 = given_5[l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin = sines[0][l];
             let upper_arm_link_cos = cosines[0][l];
@@ -1169,16 +1217,16 @@ impl Ur5 {
             let shoulder_link_t19 = upper_arm_link_m_rx_z - 1.5151591301;
             // ground: energy
             let minus_energy_1 = 9.81 * shoulder_link_t19;
-            results[0][l] = energy_0;
-            results[1][l] = -minus_energy_1;
+            result_0[l] = energy_0;
+            result_1[l] = -minus_energy_1;
         }
-        energy.give_pair(0, [&results[0], &results[1]]);
+        energy.give_pair(0, [&result_0, &result_1]);
     }
 
     /// Accelerations: time derivatives `v̇` of the velocities.
     /// 342 operations: 149 additions, 188 multiplications, 5 divisions; apart: 0 square roots, 5 sine-cosine pairs.
     pub fn accelerations(&self, q: &[f64; 6], v: &[f64; 6], a: &mut [f64; 6]) {
-        Self::accelerations_kernel::<::multibody::runtime::kernel::Plain, 1>(q, v, &self.tau, a);
+        ::multibody::runtime::kernel::call_exact::<Self, 4, _>((q, v, &self.tau, a,));
     }
 
     #[inline(always)]
@@ -1199,33 +1247,49 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = tau.get(0, l); }
-        for l in 0..LANES { given[7][l] = tau.get(1, l); }
-        for l in 0..LANES { given[8][l] = tau.get(2, l); }
-        for l in 0..LANES { given[9][l] = tau.get(3, l); }
-        for l in 0..LANES { given[10][l] = tau.get(4, l); }
-        for l in 0..LANES { given[11][l] = tau.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = tau.get(0, l); }
+        for l in 0..LANES { given_7[l] = tau.get(1, l); }
+        for l in 0..LANES { given_8[l] = tau.get(2, l); }
+        for l in 0..LANES { given_9[l] = tau.get(3, l); }
+        for l in 0..LANES { given_10[l] = tau.get(4, l); }
+        for l in 0..LANES { given_11[l] = tau.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let tau_0 = given[6][l];
-            let tau_1 = given[7][l];
-            let tau_2 = given[8][l];
-            let tau_3 = given[9][l];
-            let tau_4 = given[10][l];
-            let tau_5 = given[11][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let tau_0 = given_6[l];
+            let tau_1 = given_7[l];
+            let tau_2 = given_8[l];
+            let tau_3 = given_9[l];
+            let tau_4 = given_10[l];
+            let tau_5 = given_11[l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin = sines[0][l];
             let upper_arm_link_cos = cosines[0][l];
@@ -1619,16 +1683,16 @@ impl Ur5 {
             let a_4 = wrist_2_link_a - wrist_1_link_minus_alpha_y;
             // wrist_3_link: acceleration
             let a_5 = wrist_2_link_minus_alpha_y + wrist_3_link_a;
-            results[0][l] = shoulder_link_a;
-            results[1][l] = upper_arm_link_a;
-            results[2][l] = forearm_link_a;
-            results[3][l] = wrist_1_link_a;
-            results[4][l] = a_4;
-            results[5][l] = a_5;
+            result_0[l] = shoulder_link_a;
+            result_1[l] = upper_arm_link_a;
+            result_2[l] = forearm_link_a;
+            result_3[l] = wrist_1_link_a;
+            result_4[l] = a_4;
+            result_5[l] = a_5;
         }
-        a.give_pair(0, [&results[0], &results[1]]);
-        a.give_pair(2, [&results[2], &results[3]]);
-        a.give_pair(4, [&results[4], &results[5]]);
+        a.give_pair(0, [&result_0, &result_1]);
+        a.give_pair(2, [&result_2, &result_3]);
+        a.give_pair(4, [&result_4, &result_5]);
     }
 
     /// Mass matrix, by rows.
@@ -1656,7 +1720,42 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 36]);
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
+        let mut result_12 = [0.0; LANES];
+        let mut result_13 = [0.0; LANES];
+        let mut result_14 = [0.0; LANES];
+        let mut result_15 = [0.0; LANES];
+        let mut result_16 = [0.0; LANES];
+        let mut result_17 = [0.0; LANES];
+        let mut result_18 = [0.0; LANES];
+        let mut result_19 = [0.0; LANES];
+        let mut result_20 = [0.0; LANES];
+        let mut result_21 = [0.0; LANES];
+        let mut result_22 = [0.0; LANES];
+        let mut result_23 = [0.0; LANES];
+        let mut result_24 = [0.0; LANES];
+        let mut result_25 = [0.0; LANES];
+        let mut result_26 = [0.0; LANES];
+        let mut result_27 = [0.0; LANES];
+        let mut result_28 = [0.0; LANES];
+        let mut result_29 = [0.0; LANES];
+        let mut result_30 = [0.0; LANES];
+        let mut result_31 = [0.0; LANES];
+        let mut result_32 = [0.0; LANES];
+        let mut result_33 = [0.0; LANES];
+        let mut result_34 = [0.0; LANES];
+        let mut result_35 = [0.0; LANES];
         for l in 0..LANES {
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin = sines[0][l];
@@ -1769,61 +1868,61 @@ impl Ur5 {
             let upper_arm_link_t3 = forearm_link_t18 - minus_m_1_1;
             let upper_arm_link_t4 = minus_m_1_1 + upper_arm_link_t3;
             let m_0_0 = 2.7644263025275 - upper_arm_link_t4;
-            results[0][l] = m_0_0;
-            results[1][l] = m_0_1;
-            results[2][l] = m_0_2;
-            results[3][l] = m_0_3;
-            results[4][l] = m_0_4;
-            results[5][l] = -minus_m_0_5;
-            results[6][l] = m_0_1;
-            results[7][l] = -minus_m_1_1;
-            results[8][l] = m_1_2;
-            results[9][l] = -minus_m_1_3;
-            results[10][l] = m_1_4;
-            results[11][l] = m_1_5;
-            results[12][l] = m_0_2;
-            results[13][l] = m_1_2;
-            results[14][l] = -minus_m_2_2;
-            results[15][l] = -minus_m_2_3;
-            results[16][l] = m_1_4;
-            results[17][l] = m_1_5;
-            results[18][l] = m_0_3;
-            results[19][l] = -minus_m_1_3;
-            results[20][l] = -minus_m_2_3;
-            results[21][l] = -minus_m_3_3;
-            results[22][l] = m_1_4;
-            results[23][l] = m_1_5;
-            results[24][l] = m_0_4;
-            results[25][l] = m_1_4;
-            results[26][l] = m_1_4;
-            results[27][l] = m_1_4;
-            results[28][l] = -minus_m_4_4;
-            results[29][l] = 0.0;
-            results[30][l] = -minus_m_0_5;
-            results[31][l] = m_1_5;
-            results[32][l] = m_1_5;
-            results[33][l] = m_1_5;
-            results[34][l] = 0.0;
-            results[35][l] = 0.0171364731454;
+            result_0[l] = m_0_0;
+            result_1[l] = m_0_1;
+            result_2[l] = m_0_2;
+            result_3[l] = m_0_3;
+            result_4[l] = m_0_4;
+            result_5[l] = -minus_m_0_5;
+            result_6[l] = m_0_1;
+            result_7[l] = -minus_m_1_1;
+            result_8[l] = m_1_2;
+            result_9[l] = -minus_m_1_3;
+            result_10[l] = m_1_4;
+            result_11[l] = m_1_5;
+            result_12[l] = m_0_2;
+            result_13[l] = m_1_2;
+            result_14[l] = -minus_m_2_2;
+            result_15[l] = -minus_m_2_3;
+            result_16[l] = m_1_4;
+            result_17[l] = m_1_5;
+            result_18[l] = m_0_3;
+            result_19[l] = -minus_m_1_3;
+            result_20[l] = -minus_m_2_3;
+            result_21[l] = -minus_m_3_3;
+            result_22[l] = m_1_4;
+            result_23[l] = m_1_5;
+            result_24[l] = m_0_4;
+            result_25[l] = m_1_4;
+            result_26[l] = m_1_4;
+            result_27[l] = m_1_4;
+            result_28[l] = -minus_m_4_4;
+            result_29[l] = 0.0;
+            result_30[l] = -minus_m_0_5;
+            result_31[l] = m_1_5;
+            result_32[l] = m_1_5;
+            result_33[l] = m_1_5;
+            result_34[l] = 0.0;
+            result_35[l] = 0.0171364731454;
         }
-        m.give_pair(0, [&results[0], &results[1]]);
-        m.give_pair(2, [&results[2], &results[3]]);
-        m.give_pair(4, [&results[4], &results[5]]);
-        m.give_pair(6, [&results[6], &results[7]]);
-        m.give_pair(8, [&results[8], &results[9]]);
-        m.give_pair(10, [&results[10], &results[11]]);
-        m.give_pair(12, [&results[12], &results[13]]);
-        m.give_pair(14, [&results[14], &results[15]]);
-        m.give_pair(16, [&results[16], &results[17]]);
-        m.give_pair(18, [&results[18], &results[19]]);
-        m.give_pair(20, [&results[20], &results[21]]);
-        m.give_pair(22, [&results[22], &results[23]]);
-        m.give_pair(24, [&results[24], &results[25]]);
-        m.give_pair(26, [&results[26], &results[27]]);
-        m.give_pair(28, [&results[28], &results[29]]);
-        m.give_pair(30, [&results[30], &results[31]]);
-        m.give_pair(32, [&results[32], &results[33]]);
-        m.give_pair(34, [&results[34], &results[35]]);
+        m.give_pair(0, [&result_0, &result_1]);
+        m.give_pair(2, [&result_2, &result_3]);
+        m.give_pair(4, [&result_4, &result_5]);
+        m.give_pair(6, [&result_6, &result_7]);
+        m.give_pair(8, [&result_8, &result_9]);
+        m.give_pair(10, [&result_10, &result_11]);
+        m.give_pair(12, [&result_12, &result_13]);
+        m.give_pair(14, [&result_14, &result_15]);
+        m.give_pair(16, [&result_16, &result_17]);
+        m.give_pair(18, [&result_18, &result_19]);
+        m.give_pair(20, [&result_20, &result_21]);
+        m.give_pair(22, [&result_22, &result_23]);
+        m.give_pair(24, [&result_24, &result_25]);
+        m.give_pair(26, [&result_26, &result_27]);
+        m.give_pair(28, [&result_28, &result_29]);
+        m.give_pair(30, [&result_30, &result_31]);
+        m.give_pair(32, [&result_32, &result_33]);
+        m.give_pair(34, [&result_34, &result_35]);
     }
 
     /// Joint forces of given accelerations: `τ = M v̇ + h`.
@@ -1852,33 +1951,49 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        for l in 0..LANES { given[6][l] = a.get(0, l); }
-        for l in 0..LANES { given[7][l] = a.get(1, l); }
-        for l in 0..LANES { given[8][l] = a.get(2, l); }
-        for l in 0..LANES { given[9][l] = a.get(3, l); }
-        for l in 0..LANES { given[10][l] = a.get(4, l); }
-        for l in 0..LANES { given[11][l] = a.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        for l in 0..LANES { given_6[l] = a.get(0, l); }
+        for l in 0..LANES { given_7[l] = a.get(1, l); }
+        for l in 0..LANES { given_8[l] = a.get(2, l); }
+        for l in 0..LANES { given_9[l] = a.get(3, l); }
+        for l in 0..LANES { given_10[l] = a.get(4, l); }
+        for l in 0..LANES { given_11[l] = a.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            let a_0 = given[6][l];
-            let a_1 = given[7][l];
-            let a_2 = given[8][l];
-            let a_3 = given[9][l];
-            let a_4 = given[10][l];
-            let a_5 = given[11][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            let a_0 = given_6[l];
+            let a_1 = given_7[l];
+            let a_2 = given_8[l];
+            let a_3 = given_9[l];
+            let a_4 = given_10[l];
+            let a_5 = given_11[l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin = sines[0][l];
             let upper_arm_link_cos = cosines[0][l];
@@ -2156,16 +2271,16 @@ impl Ur5 {
             let tau_1 = upper_arm_link_f_rz + forearm_link_t52;
             // upper_arm_link: gravity and wrenches
             let tau_0 = shoulder_link_f_rz - forearm_link_t53;
-            results[0][l] = tau_0;
-            results[1][l] = tau_1;
-            results[2][l] = tau_2;
-            results[3][l] = tau_3;
-            results[4][l] = tau_4;
-            results[5][l] = wrist_3_link_f_rz;
+            result_0[l] = tau_0;
+            result_1[l] = tau_1;
+            result_2[l] = tau_2;
+            result_3[l] = tau_3;
+            result_4[l] = tau_4;
+            result_5[l] = wrist_3_link_f_rz;
         }
-        tau.give_pair(0, [&results[0], &results[1]]);
-        tau.give_pair(2, [&results[2], &results[3]]);
-        tau.give_pair(4, [&results[4], &results[5]]);
+        tau.give_pair(0, [&result_0, &result_1]);
+        tau.give_pair(2, [&result_2, &result_3]);
+        tau.give_pair(4, [&result_4, &result_5]);
     }
 
     /// Bias forces `h`, with `M v̇ + h = τ`.
@@ -2194,21 +2309,31 @@ impl Ur5 {
             angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 5>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
             // upper_arm_link: sine and cosine, rotation
             let upper_arm_link_sin = sines[0][l];
             let upper_arm_link_cos = cosines[0][l];
@@ -2429,16 +2554,16 @@ impl Ur5 {
             let forearm_link_t30 = forearm_link_t26 - forearm_link_t29;
             let minus_h_0 = upper_arm_link_f_ry + forearm_link_t28;
             let h_1 = upper_arm_link_f_rz + forearm_link_t30;
-            results[0][l] = -minus_h_0;
-            results[1][l] = h_1;
-            results[2][l] = h_2;
-            results[3][l] = -minus_h_3;
-            results[4][l] = h_4;
-            results[5][l] = -wrist_3_link_minus_f_rz;
+            result_0[l] = -minus_h_0;
+            result_1[l] = h_1;
+            result_2[l] = h_2;
+            result_3[l] = -minus_h_3;
+            result_4[l] = h_4;
+            result_5[l] = -wrist_3_link_minus_f_rz;
         }
-        h.give_pair(0, [&results[0], &results[1]]);
-        h.give_pair(2, [&results[2], &results[3]]);
-        h.give_pair(4, [&results[4], &results[5]]);
+        h.give_pair(0, [&result_0, &result_1]);
+        h.give_pair(2, [&result_2, &result_3]);
+        h.give_pair(4, [&result_4, &result_5]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -2449,31 +2574,41 @@ impl Ur5 {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            results[0][l] = v_0;
-            results[1][l] = v_1;
-            results[2][l] = v_2;
-            results[3][l] = v_3;
-            results[4][l] = v_4;
-            results[5][l] = v_5;
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            result_0[l] = v_0;
+            result_1[l] = v_1;
+            result_2[l] = v_2;
+            result_3[l] = v_3;
+            result_4[l] = v_4;
+            result_5[l] = v_5;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -88,33 +88,55 @@ impl Ur5Fast {
             angles[4][l] = wrist_1_link_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<A, LANES, 5>(&angles);
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
-        for l in 0..LANES { given[0][l] = p.get(0, l); }
-        for l in 0..LANES { given[1][l] = p.get(1, l); }
-        for l in 0..LANES { given[2][l] = p.get(2, l); }
-        for l in 0..LANES { given[3][l] = p.get(3, l); }
-        for l in 0..LANES { given[4][l] = p.get(4, l); }
-        for l in 0..LANES { given[5][l] = p.get(5, l); }
-        for l in 0..LANES { given[6][l] = tau.get(0, l); }
-        for l in 0..LANES { given[7][l] = tau.get(1, l); }
-        for l in 0..LANES { given[8][l] = tau.get(2, l); }
-        for l in 0..LANES { given[9][l] = tau.get(3, l); }
-        for l in 0..LANES { given[10][l] = tau.get(4, l); }
-        for l in 0..LANES { given[11][l] = tau.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 12]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        let mut given_6 = [0.0; LANES];
+        let mut given_7 = [0.0; LANES];
+        let mut given_8 = [0.0; LANES];
+        let mut given_9 = [0.0; LANES];
+        let mut given_10 = [0.0; LANES];
+        let mut given_11 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = p.get(0, l); }
+        for l in 0..LANES { given_1[l] = p.get(1, l); }
+        for l in 0..LANES { given_2[l] = p.get(2, l); }
+        for l in 0..LANES { given_3[l] = p.get(3, l); }
+        for l in 0..LANES { given_4[l] = p.get(4, l); }
+        for l in 0..LANES { given_5[l] = p.get(5, l); }
+        for l in 0..LANES { given_6[l] = tau.get(0, l); }
+        for l in 0..LANES { given_7[l] = tau.get(1, l); }
+        for l in 0..LANES { given_8[l] = tau.get(2, l); }
+        for l in 0..LANES { given_9[l] = tau.get(3, l); }
+        for l in 0..LANES { given_10[l] = tau.get(4, l); }
+        for l in 0..LANES { given_11[l] = tau.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
+        let mut result_6 = [0.0; LANES];
+        let mut result_7 = [0.0; LANES];
+        let mut result_8 = [0.0; LANES];
+        let mut result_9 = [0.0; LANES];
+        let mut result_10 = [0.0; LANES];
+        let mut result_11 = [0.0; LANES];
         for l in 0..LANES {
-            let p_0 = given[0][l];
-            let p_1 = given[1][l];
-            let p_2 = given[2][l];
-            let p_3 = given[3][l];
-            let p_4 = given[4][l];
-            let p_5 = given[5][l];
-            let tau_0 = given[6][l];
-            let tau_1 = given[7][l];
-            let tau_2 = given[8][l];
-            let tau_3 = given[9][l];
-            let tau_4 = given[10][l];
-            let tau_5 = given[11][l];
+            let p_0 = given_0[l];
+            let p_1 = given_1[l];
+            let p_2 = given_2[l];
+            let p_3 = given_3[l];
+            let p_4 = given_4[l];
+            let p_5 = given_5[l];
+            let tau_0 = given_6[l];
+            let tau_1 = given_7[l];
+            let tau_2 = given_8[l];
+            let tau_3 = given_9[l];
+            let tau_4 = given_10[l];
+            let tau_5 = given_11[l];
             // wrist_3_link: sine and cosine, rotation
             let wrist_3_link_sin = sines[2][l];
             let wrist_3_link_cos = cosines[2][l];
@@ -447,25 +469,25 @@ impl Ur5Fast {
             let pd_3 = A::fma_f64(shoulder_link_minus_v, wrist_1_link_t37, wrist_3_link_t16);
             // wrist_2_link: velocity and joint rate (4.40)
             let wrist_2_link_minus_v = wrist_2_link_minus_omega_rz + wrist_2_link_t18;
-            results[0][l] = -shoulder_link_minus_v;
-            results[1][l] = upper_arm_link_v;
-            results[2][l] = -forearm_link_minus_v;
-            results[3][l] = wrist_1_link_v;
-            results[4][l] = -wrist_2_link_minus_v;
-            results[5][l] = wrist_3_link_v;
-            results[6][l] = tau_0;
-            results[7][l] = pd_1;
-            results[8][l] = pd_2;
-            results[9][l] = pd_3;
-            results[10][l] = pd_4;
-            results[11][l] = pd_5;
+            result_0[l] = -shoulder_link_minus_v;
+            result_1[l] = upper_arm_link_v;
+            result_2[l] = -forearm_link_minus_v;
+            result_3[l] = wrist_1_link_v;
+            result_4[l] = -wrist_2_link_minus_v;
+            result_5[l] = wrist_3_link_v;
+            result_6[l] = tau_0;
+            result_7[l] = pd_1;
+            result_8[l] = pd_2;
+            result_9[l] = pd_3;
+            result_10[l] = pd_4;
+            result_11[l] = pd_5;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
-        pd.give_pair(0, [&results[6], &results[7]]);
-        pd.give_pair(2, [&results[8], &results[9]]);
-        pd.give_pair(4, [&results[10], &results[11]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
+        pd.give_pair(0, [&result_6, &result_7]);
+        pd.give_pair(2, [&result_8, &result_9]);
+        pd.give_pair(4, [&result_10, &result_11]);
     }
 
     /// Coordinate rates of given velocities: `q̇ = N(q) v`.
@@ -476,31 +498,41 @@ impl Ur5Fast {
 
     #[inline(always)]
     fn coordinate_rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
-        let mut given = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
-        for l in 0..LANES { given[0][l] = v.get(0, l); }
-        for l in 0..LANES { given[1][l] = v.get(1, l); }
-        for l in 0..LANES { given[2][l] = v.get(2, l); }
-        for l in 0..LANES { given[3][l] = v.get(3, l); }
-        for l in 0..LANES { given[4][l] = v.get(4, l); }
-        for l in 0..LANES { given[5][l] = v.get(5, l); }
-        let mut results = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        let mut given_0 = [0.0; LANES];
+        let mut given_1 = [0.0; LANES];
+        let mut given_2 = [0.0; LANES];
+        let mut given_3 = [0.0; LANES];
+        let mut given_4 = [0.0; LANES];
+        let mut given_5 = [0.0; LANES];
+        for l in 0..LANES { given_0[l] = v.get(0, l); }
+        for l in 0..LANES { given_1[l] = v.get(1, l); }
+        for l in 0..LANES { given_2[l] = v.get(2, l); }
+        for l in 0..LANES { given_3[l] = v.get(3, l); }
+        for l in 0..LANES { given_4[l] = v.get(4, l); }
+        for l in 0..LANES { given_5[l] = v.get(5, l); }
+        let mut result_0 = [0.0; LANES];
+        let mut result_1 = [0.0; LANES];
+        let mut result_2 = [0.0; LANES];
+        let mut result_3 = [0.0; LANES];
+        let mut result_4 = [0.0; LANES];
+        let mut result_5 = [0.0; LANES];
         for l in 0..LANES {
-            let v_0 = given[0][l];
-            let v_1 = given[1][l];
-            let v_2 = given[2][l];
-            let v_3 = given[3][l];
-            let v_4 = given[4][l];
-            let v_5 = given[5][l];
-            results[0][l] = v_0;
-            results[1][l] = v_1;
-            results[2][l] = v_2;
-            results[3][l] = v_3;
-            results[4][l] = v_4;
-            results[5][l] = v_5;
+            let v_0 = given_0[l];
+            let v_1 = given_1[l];
+            let v_2 = given_2[l];
+            let v_3 = given_3[l];
+            let v_4 = given_4[l];
+            let v_5 = given_5[l];
+            result_0[l] = v_0;
+            result_1[l] = v_1;
+            result_2[l] = v_2;
+            result_3[l] = v_3;
+            result_4[l] = v_4;
+            result_5[l] = v_5;
         }
-        qd.give_pair(0, [&results[0], &results[1]]);
-        qd.give_pair(2, [&results[2], &results[3]]);
-        qd.give_pair(4, [&results[4], &results[5]]);
+        qd.give_pair(0, [&result_0, &result_1]);
+        qd.give_pair(2, [&result_2, &result_3]);
+        qd.give_pair(4, [&result_4, &result_5]);
     }
 
     /// The same for several states at once; the inputs are copied into every lane.

@@ -1,7 +1,7 @@
 //! Generated code for the instructions of the processor: one source text, compiled for several levels.
 //!
-//! The body of a generated function is a [`Kernel`], generic over an [`Arithmetic`]. [`call`] and [`call_lanes`] run it
-//! in the version for the best level that the processor supports. With feature `std` the level is detected at run time,
+//! The body of a generated function is a [`Kernel`], generic over an [`Arithmetic`]. [`call`], [`call_long`],
+//! [`call_exact`] and [`call_lanes`] run it in the version for the best level that the processor supports. With feature `std` the level is detected at run time,
 //! once, so that a plain `cargo build --release` is fast everywhere. Without it, kernels are plain code of the target.
 //!
 //! | arithmetic | `a · b + c` | where |
@@ -11,7 +11,7 @@
 //!
 //! The compiler makes the vector instructions: a kernel is a loop over lanes whose body is straight-line code, and the
 //! compiler vectorises this loop. If the processor has AVX-512 and the compiler is 1.89 or later, lanes that fill its
-//! registers use it.
+//! registers use it, and so do long kernels for one state, because it has twice as many registers.
 //!
 //! The only `unsafe` code of the runtime is in this file. Its end calls functions that are compiled for more than the
 //! baseline of the target. This is sound because every call first asks [`level`] which instructions the processor has.
@@ -314,6 +314,23 @@ pub fn limit_level(most: Level) -> Level {
 #[inline(always)]
 pub fn call<K: Kernel<ID, 1, X>, const ID: usize, X>(arguments: X) {
     processor::call::<K, ID, 1, X, false>(arguments);
+}
+
+/// Runs a kernel for one state that is so long that registers run short: with AVX-512, which has twice as many, where the
+/// processor has it. Without optimisation, for which debug assertions stand, nothing is gained, and a version less is compiled.
+#[inline(always)]
+pub fn call_long<K: Kernel<ID, 1, X>, const ID: usize, X>(arguments: X) {
+    processor::call::<K, ID, 1, X, { !cfg!(debug_assertions) }>(arguments);
+}
+
+/// Runs a long kernel of exact arithmetic for one state, whose body is in [`Plain`] arithmetic whatever it is called with:
+/// the same bits with the instructions of every level. With debug assertions, only the version of the target is compiled.
+#[inline(always)]
+pub fn call_exact<K: Kernel<ID, 1, X>, const ID: usize, X>(arguments: X) {
+    #[cfg(debug_assertions)]
+    K::run::<Plain>(arguments);
+    #[cfg(not(debug_assertions))]
+    processor::call::<K, ID, 1, X, true>(arguments);
 }
 
 /// Runs a kernel for `L` states of numbers of type `T`.

@@ -3,8 +3,8 @@
 //!     cargo run --release --manifest-path benches/machine_code/Cargo.toml
 //!
 //! All run in turns on the same random states, one after the other and as a chain in which every state waits for the
-//! rates of the one before. The least of many rounds counts. Machine code is made twice: as users get it, and with like
-//! branches one after the other. Names of models choose some of them.
+//! rates of the one before. Both have to agree first, bit for bit in exact arithmetic. The least of many rounds counts. Machine code is made twice: as users get it, and with like
+//! branches one after the other. Names of models choose some of them; `--fused` leaves out what processors with AVX-512 have.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -88,6 +88,29 @@ where
     least
 }
 
+/// Largest difference of the rates of two systems, relative to the largest rate of a state.
+fn difference<A: System<Scalar = f64>, B: System<Scalar = f64>>(a: &mut A, b: &mut B) -> f64
+where
+    A::Coordinates: AsMut<[f64]>,
+    A::Momenta: AsMut<[f64]>,
+    B::Coordinates: AsMut<[f64]>,
+    B::Momenta: AsMut<[f64]>,
+{
+    let rates = |qd: &mut [f64], pd: &mut [f64]| [qd, pd].concat();
+    let mut most = 0.0;
+    for (of_a, of_b) in states(a).iter().zip(&states(b)) {
+        let (mut qd, mut pd) = (a.neutral(), a.zero_momenta());
+        a.rates_at(0.0, &of_a.0, &of_a.1, &mut qd, &mut pd);
+        let one = rates(qd.as_mut(), pd.as_mut());
+        let (mut qd, mut pd) = (b.neutral(), b.zero_momenta());
+        b.rates_at(0.0, &of_b.0, &of_b.1, &mut qd, &mut pd);
+        let other = rates(qd.as_mut(), pd.as_mut());
+        let size = one.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+        most = one.iter().zip(&other).fold(most, |most: f64, (x, y)| most.max((x - y).abs() / size));
+    }
+    most
+}
+
 fn compiled(path: &str, floating: bool, arithmetic: Arithmetic, branches: LikeBranches) -> Compiled {
     let text = std::fs::read_to_string(format!("{}/{path}", env!("CARGO_MANIFEST_DIR"))).expect("the model");
     let base = if floating { Base::Floating } else { Base::Fixed };
@@ -110,7 +133,11 @@ macro_rules! models {
         fn main() {
             println!("| model | arithmetic | independent: machine code | branches apart | Rust | ratio | chained: machine code | branches apart | Rust | ratio |");
             println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
-            let chosen: Vec<String> = std::env::args().skip(1).collect();
+            let mut chosen: Vec<String> = std::env::args().skip(1).collect();
+            if let Some(at) = chosen.iter().position(|name| name == "--fused") {
+                chosen.remove(at);
+                mbd_runtime::kernel::limit_level(mbd_runtime::kernel::Level::Fused);
+            }
             let both = |path, floating, arithmetic| {
                 [LikeBranches::Auto, LikeBranches::Apart].map(|branches| compiled(path, floating, arithmetic, branches))
             };
@@ -122,11 +149,15 @@ macro_rules! models {
     };
 }
 
-fn row<B: System>(name: &str, arithmetic: &str, machine: &mut [Compiled; 2], rust: &mut B)
+fn row<B: System<Scalar = f64>>(name: &str, arithmetic: &str, machine: &mut [Compiled; 2], rust: &mut B)
 where
     B::Coordinates: AsMut<[f64]>,
     B::Momenta: AsMut<[f64]>,
 {
+    for machine in &mut *machine {
+        let (found, most) = (difference(machine, rust), if arithmetic == "exact" { 0.0 } else { 1e-9 });
+        assert!(found <= most, "{name}, {arithmetic}: machine code and Rust differ by {found:e}");
+    }
     print!("| {name} | {arithmetic} |");
     for chained in [false, true] {
         let [m, apart, r] = least(machine, rust, chained);

@@ -9,7 +9,8 @@ use crate::options::{Arithmetic, Options};
 use crate::output::{locate, InputArray};
 use crate::symbolic::{FlooredReciprocal, Fma, Op, Operand, ProgramResult};
 
-/// Largest number of statements of a function that is inlined, so that small kernels become part of the caller's loop.
+/// Largest number of statements of a function that is inlined, so that small kernels become part of the caller's loop. Longer
+/// ones run short of registers.
 const INLINED: usize = 300;
 
 /// A function and its kernel before their bodies are written.
@@ -49,9 +50,12 @@ impl Head<'_> {
         }
         let _ = writeln!(out, "    {public}fn {} {{", self.signature.declaration(rt, self.options.precision.name()));
         let arguments: Vec<String> = self.ports.iter().map(Port::argument).collect();
-        let call = match self.chooses() {
-            true => format!("{rt}::kernel::call::<Self, {id}, _>({})", tuple(&arguments)),
-            false => format!("Self::{name}_kernel::<{rt}::kernel::Plain, 1>({})", arguments.join(", ")),
+        let by = |way: &str| format!("{rt}::kernel::{way}::<Self, {id}, _>({})", tuple(&arguments));
+        let call = match (self.chooses(), statements > INLINED) {
+            (true, true) => by("call_long"),
+            (true, false) => by("call"),
+            (false, true) => by("call_exact"),
+            (false, false) => format!("Self::{name}_kernel::<{rt}::kernel::Plain, 1>({})", arguments.join(", ")),
         };
         let _ = writeln!(out, "{}    }}", self.signature.body(rt, "0.0", &call));
         let parameters = self.parameters();
@@ -65,7 +69,16 @@ impl Head<'_> {
         self.ports.iter().map(|p| p.parameter(rt, number)).collect::<Vec<_>>().join(", ")
     }
 
-    /// A local array of the kernel.
+    /// Local arrays of the kernel, one for each of `n` numbers: the compiler does not take a large array apart after it has made
+    /// vectors of lanes or branches, but keeps the numbers of small ones in registers. (Of rolled code for one state the
+    /// opposite was measured.)
+    pub fn locals(&self, out: &mut String, indent: &str, name: &str, n: usize) {
+        for k in 0..n {
+            let _ = writeln!(out, "{indent}let mut {name}_{k} = [0.0; LANES];");
+        }
+    }
+
+    /// A local array of the kernel with a row for each of `n` numbers.
     pub fn rows(&self, n: usize) -> String {
         format!("{}::kernel::Rows([[0.0; LANES]; {n}])", self.options.runtime)
     }

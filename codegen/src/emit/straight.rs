@@ -84,10 +84,7 @@ impl<'a> Straight<'a> {
         }
         self.write_sines(out);
         self.write_given(out);
-        let n = self.program.outputs.len();
-        if n > 0 {
-            let _ = writeln!(out, "        let mut results = {};", self.head.rows(n));
-        }
+        self.head.locals(out, "        ", "result", self.program.outputs.len());
         let _ = writeln!(out, "        for l in 0..LANES {{");
         self.write_steps(out, &self.angles.after, true);
         self.write_results(out);
@@ -171,7 +168,7 @@ impl<'a> Straight<'a> {
         let (name, is_input) = (&self.names[id], matches!(op, Op::Input(_)));
         let own = |text: String, uses| Some(Statement { text, makes: vec![*id], uses, label: *label, is_input });
         if let Some(k) = given.get(id) {
-            return own(format!("let {name} = given[{k}][l];"), Vec::new());
+            return own(format!("let {name} = given_{k}[l];"), Vec::new());
         }
         let (angle, row) = match op {
             Op::Sin(a) => (a, "sines"),
@@ -207,21 +204,18 @@ impl<'a> Straight<'a> {
     /// Inputs are copied first, as results are written last: the loop over lanes then uses memory that nothing else can
     /// point to, and the compiler vectorises it without run-time checks for overlap.
     fn write_given(&self, out: &mut String) {
-        let n = self.given().count();
-        if n > 0 {
-            let _ = writeln!(out, "        let mut given = {};", self.head.rows(n));
-        }
+        self.head.locals(out, "        ", "given", self.given().count());
         for (to, (_, k)) in self.given().enumerate() {
             let from = self.head.input(k as usize, "", "l");
-            let _ = writeln!(out, "        for l in 0..LANES {{ given[{to}][l] = {from}; }}");
+            let _ = writeln!(out, "        for l in 0..LANES {{ given_{to}[l] = {from}; }}");
         }
     }
 
-    /// Results are collected in an array before they are written to the arguments.
+    /// Results are collected in arrays before they are written to the arguments.
     fn write_results(&self, out: &mut String) {
         for (k, result) in self.program.outputs.iter().enumerate() {
             let value = self.head.value(result, &self.names);
-            let _ = writeln!(out, "            results[{k}][l] = {value};");
+            let _ = writeln!(out, "            result_{k}[l] = {value};");
         }
         let _ = writeln!(out, "        }}");
         let places = self.head.places();
@@ -230,11 +224,11 @@ impl<'a> Straight<'a> {
             // Two at once where they stand beside one another.
             at += match places.get(at + 1) {
                 Some((next, _)) if next == name => {
-                    let _ = writeln!(out, "        {name}.give_pair({k}, [&results[{at}], &results[{}]]);", at + 1);
+                    let _ = writeln!(out, "        {name}.give_pair({k}, [&result_{at}, &result_{}]);", at + 1);
                     2
                 }
                 _ => {
-                    let _ = writeln!(out, "        {name}.give({k}, &results[{at}]);");
+                    let _ = writeln!(out, "        {name}.give({k}, &result_{at});");
                     1
                 }
             };

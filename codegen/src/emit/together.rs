@@ -78,7 +78,7 @@ impl<'a> TogetherWriter<'a> {
         }
         for (b, block) in self.program.blocks.iter().enumerate().filter(|(_, block)| !is_sines(block)) {
             if block.repeat.is_some() {
-                let _ = writeln!(out, "        let mut branches{b} = {};", self.head.rows(block.outputs.len()));
+                self.head.locals(out, "        ", &format!("branches{b}"), block.outputs.len());
             }
             let _ = writeln!(out, "        {{");
             self.block(out, b, block);
@@ -161,50 +161,71 @@ impl<'a> TogetherWriter<'a> {
         let (indent, _) = self.open(out, block);
         let mut last = None;
         let mut late = pairs(&block.program);
+        let (mut stores, results) = self.stores(b, block);
+        let mut store = |out: &mut String, id: Option<u32>| {
+            for line in stores.remove(&id).unwrap_or_default() {
+                let _ = writeln!(out, "{indent}{line}");
+            }
+        };
         for (id, op, label) in &block.program.steps {
-            let text = match op {
+            let (text, defined) = match op {
                 Op::Sin(a) | Op::Cos(a) if !self.angles.contains_key(&(b, *a)) => {
                     // The first one of a pair represents both.
-                    let Some(pair) = late.remove(a) else { continue };
-                    let pair = pair.map(|id| id.map_or("_", |id| self.names[b][&id].as_str()));
-                    self.head.sine_and_cosine(pair, &self.names[b][a])
+                    let Some(ids) = late.remove(a) else { continue };
+                    let pair = ids.map(|id| id.map_or("_", |id| self.names[b][&id].as_str()));
+                    (self.head.sine_and_cosine(pair, &self.names[b][a]), ids)
                 }
-                op => format!("let {} = {};", self.names[b][id], self.value(b, block, op)),
+                op => (format!("let {} = {};", self.names[b][id], self.value(b, block, op)), [Some(*id), None]),
             };
             if block.repeat.is_none() && last != Some(*label) && !matches!(op, Op::Input(_)) {
                 let _ = writeln!(out, "{indent}// {}", heading(self.plan, *label));
                 last = Some(*label);
             }
             let _ = writeln!(out, "{indent}{text}");
-        }
-        let places = self.head.places();
-        let give = |result: usize, value: &str| {
-            let (port, at) = places[result];
-            format!("            {port}.set({at}, 0, {value});\n")
-        };
-        let mut results = String::new();
-        for (k, (result, target)) in block.program.outputs.iter().zip(&block.outputs).enumerate() {
-            let value = self.head.value(result, &self.names[b]);
-            match *target {
-                Target::Result(result) => results += &give(result, &value),
-                Target::Kept(slot) => results += &format!("            kept[{slot}] = {value};\n"),
-                Target::ResultOfTurn { first, stride } => {
-                    let _ = writeln!(out, "{indent}branches{b}[{k}][k] = {value};");
-                    let turns = block.repeat.as_ref().map_or(0, |r| self.program.loops[r.run].table.len());
-                    for turn in 0..turns {
-                        results += &give(first + stride * turn, &format!("branches{b}[{k}][{turn}]"));
-                    }
-                }
-                Target::Row(_) => {
-                    let _ = writeln!(out, "{indent}branches{b}[{k}][k] = {value};");
-                }
-                Target::Carried(_) => unreachable!("branches hand nothing on to each other"),
+            for id in defined.into_iter().flatten() {
+                store(out, Some(id));
             }
         }
+        store(out, None);
         if block.repeat.is_some() {
             let _ = writeln!(out, "            }}");
         }
         out.push_str(&results);
+    }
+
+    /// Statements that write the results of a block, by the node that each of them writes (constants have none), and those
+    /// that hand on results of branches after their loop. A number is written as soon as it is computed: at the end
+    /// of a block most of them would have left the registers, and be read for it once more.
+    fn stores(&self, b: usize, block: &Block) -> (BTreeMap<Option<u32>, Vec<String>>, String) {
+        let places = self.head.places();
+        let give = |result: usize, value: &str| {
+            let (port, at) = places[result];
+            format!("{port}.set({at}, 0, {value});")
+        };
+        let (mut stores, mut results) = (BTreeMap::<_, Vec<String>>::new(), String::new());
+        for (k, (result, target)) in block.program.outputs.iter().zip(&block.outputs).enumerate() {
+            let value = self.head.value(result, &self.names[b]);
+            let line = match *target {
+                Target::Result(result) => give(result, &value),
+                Target::Kept(slot) => format!("kept[{slot}] = {value};"),
+                Target::ResultOfTurn { first, stride } => {
+                    let turns = block.repeat.as_ref().map_or(0, |r| self.program.loops[r.run].table.len());
+                    for turn in 0..turns {
+                        let value = format!("branches{b}_{k}[{turn}]");
+                        let _ = writeln!(results, "            {}", give(first + stride * turn, &value));
+                    }
+                    format!("branches{b}_{k}[k] = {value};")
+                }
+                Target::Row(_) => format!("branches{b}_{k}[k] = {value};"),
+                Target::Carried(_) => unreachable!("branches hand nothing on to each other"),
+            };
+            let node = match result {
+                ProgramResult::Const(_) => None,
+                ProgramResult::Node(id, _) => Some(*id),
+            };
+            stores.entry(node).or_default().push(line);
+        }
+        (stores, results)
     }
 
     fn value(&self, b: usize, block: &Block, op: &Op) -> String {
@@ -241,7 +262,7 @@ impl<'a> TogetherWriter<'a> {
             }
             let Some(k) = block.outputs.iter().position(|target| *target == Target::Row(row)) else { continue };
             let (true, ProgramResult::Node(id, _)) = (is_sines(block), block.program.outputs[k]) else {
-                return format!("branches{b}[{k}][{branch}]");
+                return format!("branches{b}_{k}[{branch}]");
             };
             for (angle, pair) in pairs(&block.program) {
                 if let Some(part) = pair.iter().position(|node| *node == Some(id)) {

@@ -69,8 +69,7 @@ impl Together {
         options.plan.branches == LikeBranches::Together || fewer
     }
 
-    /// Where it is to replace straight-line code for one state, if anywhere. Exact code is the same on all targets, and
-    /// made for the smallest registers.
+    /// Where it is to replace straight-line code for one state, if anywhere.
     pub fn pays(&self, straight: &Program, options: &Options) -> Option<Vectors> {
         let together = |lanes: usize| {
             let blocks = self.program.blocks.iter().map(|block| {
@@ -87,10 +86,10 @@ impl Together {
         let apart = straight.instructions();
         let fits = longest <= 2 * options.chunk.max(1000) && apart >= LEAST;
         let [any, wide] = REGISTERS.map(|lanes| fits && together(lanes) <= WORTH * apart as f64);
-        match options.arithmetic {
-            _ if any => Some(Vectors::Any),
-            Arithmetic::Fast if wide => Some(Vectors::Wide),
-            Arithmetic::Fast | Arithmetic::Exact => None,
+        match (any, wide) {
+            (true, _) => Some(Vectors::Any),
+            (false, true) => Some(Vectors::Wide),
+            (false, false) => None,
         }
     }
 }

@@ -42,3 +42,28 @@ fn places_after_the_last_state_are_dropped() {
     Columns { columns: &mut columns, at: 1 }.give(0, &[7.0; 2]);
     assert_eq!((a, b), ([0.0, 7.0, 7.0, 0.0, 5.0], [0.0, 0.0, 0.0, 1.0, 2.0]));
 }
+
+/// `a b + c` in the arithmetic of the call, and in plain arithmetic.
+struct Twice;
+
+impl Kernel<0, 1, (&[f64; 3], &mut [f64; 2])> for Twice {
+    #[inline(always)]
+    fn run<A: Arithmetic>(([a, b, c], out): (&[f64; 3], &mut [f64; 2])) {
+        *out = [A::fma_f64(*a, *b, *c), Plain::fma_f64(*a, *b, *c)];
+    }
+}
+
+/// Long kernels have the arithmetic of others, with the instructions of every level; exact ones are plain.
+#[test]
+fn long_kernels_have_the_bits_of_others() {
+    let small = f64::powi(2.0, -30);
+    let numbers = [1.0 + small, 1.0 - small, -1.0];
+    let [mut short, mut long, mut wide, mut exact] = [[f64::NAN; 2]; 4];
+    call::<Twice, 0, _>((&numbers, &mut short));
+    call_long::<Twice, 0, _>((&numbers, &mut long));
+    processor::call::<Twice, 0, 1, _, true>((&numbers, &mut wide));
+    call_exact::<Twice, 0, _>((&numbers, &mut exact));
+    let fused = if level() == Level::Plain { 0.0 } else { -small * small };
+    assert_eq!([short, long, wide], [[fused, 0.0]; 3]);
+    assert_eq!(exact[1], 0.0);
+}

@@ -133,6 +133,12 @@ impl<'a> Lowering<'a> {
                 self.array(name, Role::Filled(index(n)));
                 return;
             }
+            // let mut result_0 = [0.0; LANES];
+            [Word("let"), Word("mut"), Word(name), Word("="), Square(row)] => {
+                assert!(matches!(row[..], [Word("0.0"), Word(";"), Word("LANES")]), "unexpected row {row:?}");
+                self.array(name, Role::Filled(1));
+                return;
+            }
             // let (s, c) = ..::trig::pair_f64::<..>(x);
             // let (sines, cosines) = ..::trig::pairs_f64::<..>(&angles);
             [Word("let"), Round(pair), Word("="), Word(path), Word("::"), Word("<"), types @ .., Word(">"), Round(of)] =>
@@ -153,43 +159,46 @@ impl<'a> Lowering<'a> {
                 Step::Let(self.define(name), value)
             }
             // angles[0][l] = q_1;
-            [Word(array), Square(k), Square(lane), Word("="), value @ ..] => {
-                let Number::Item(array, k) = self.item(array, k, lane) else { unreachable!("an item") };
-                let (name, role) = &self.function.arrays[array];
-                assert!(matches!(role, Role::Filled(_)), "{name} cannot be filled");
-                Step::Set(array, k, self.expression(value))
-            }
-            // qd.give(0, &results[4]);
+            [Word(array), Square(k), Square(lane), Word("="), value @ ..] => self.set(self.item(array, k, lane), value),
+            // result_0[l] = v_1;
+            [Word(array), Square(lane), Word("="), value @ ..] => self.set(self.only_item(array, lane), value),
+            // qd.give(0, &result_4);
             [Word(to), Word("."), Word("give"), Round(result)] => {
-                let [Word(at), Word(","), Word("&"), Word(from), Square(k)] = &result[..] else {
+                let [Word(at), Word(","), Word("&"), Word(from)] = result[..] else {
                     panic!("unexpected result {result:?}")
                 };
-                self.give(to, index(at), from, k)
+                self.give(to, index(at), from)
             }
-            // qd.give_pair(0, [&results[4], &results[5]]);
+            // qd.give_pair(0, [&result_4, &result_5]);
             [Word(to), Word("."), Word("give_pair"), Round(result)] => {
                 let [Word(at), Word(","), Square(pair)] = &result[..] else { panic!("unexpected results {result:?}") };
-                let [Word("&"), Word(one), Square(j), Word(","), Word("&"), Word(two), Square(k)] = &pair[..] else {
+                let [Word("&"), Word(one), Word(","), Word("&"), Word(two)] = pair[..] else {
                     panic!("unexpected pair {pair:?}")
                 };
-                let first = self.give(to, index(at), one, j);
+                let first = self.give(to, index(at), one);
                 self.function.steps.push(first);
-                self.give(to, index(at) + 1, two, k)
+                self.give(to, index(at) + 1, two)
             }
             other => panic!("unexpected statement {other:?}"),
         };
         self.function.steps.push(step);
     }
 
-    /// A result is written: number `at` of the array `to`, from a row of the array `from`.
-    fn give(&mut self, to: &'a str, at: usize, from: &'a str, row: &[Tree<'a>]) -> Step {
-        let [Word(row)] = row else { panic!("unexpected index {row:?}") };
+    fn set(&self, item: Number, value: &[Tree<'a>]) -> Step {
+        let Number::Item(array, k) = item else { unreachable!("an item") };
+        let (name, role) = &self.function.arrays[array];
+        assert!(matches!(role, Role::Filled(_)), "{name} cannot be filled");
+        Step::Set(array, k, self.expression(value))
+    }
+
+    /// A result is written: number `at` of the array `to`, from the array `from`.
+    fn give(&mut self, to: &'a str, at: usize, from: &'a str) -> Step {
         let [to, from] = [to, from].map(|name| self.known(name));
         assert!(self.function.arrays[to].1 == Role::Written, "{:?} is not written", self.function.arrays[to].0);
         let given = self.given.entry(to).or_default();
         assert_eq!(at, *given, "results are written in order");
         *given += 1;
-        Step::Give(to, from, self.within(from, index(row)))
+        Step::Give(to, from, self.within(from, 0))
     }
 
     fn all_sines(&mut self, names: [&'a str; 2], types: &[Tree<'a>], of: &[Tree<'a>]) -> Step {
@@ -248,6 +257,13 @@ impl<'a> Lowering<'a> {
         Number::Item(array, self.within(array, index(k)))
     }
 
+    /// `result_0[l]`
+    fn only_item(&self, array: &str, lane: &[Tree]) -> Number {
+        let number = self.item(array, &[Word("0")], lane);
+        assert!(self.function.arrays[self.known(array)].1 == Role::Filled(1), "{array} has several rows");
+        number
+    }
+
     fn expression(&self, text: &[Tree<'a>]) -> Expression {
         let alone = |text: &[Tree<'a>]| match self.operand(text) {
             (x, []) => x,
@@ -293,6 +309,7 @@ impl<'a> Lowering<'a> {
                 (Number::Item(array, index(k)), rest)
             }
             [Word(array), Square(k), Square(lane), rest @ ..] => (self.item(array, k, lane), rest),
+            [Word(array), Square(lane), rest @ ..] => (self.only_item(array, lane), rest),
             [Word(name), rest @ ..] if is_name(name) => {
                 (Number::Local(*self.locals.get(name).unwrap_or_else(|| panic!("{name} is not defined"))), rest)
             }
