@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# The Python package: builds and installs it in a virtual environment under target/, and runs its tests. It shares compiled
-# dependencies with `cargo build --release`. Needs Python 3.9 or later and, on the first run, a package index.
+# The Python package: builds and installs it in a virtual environment under target/, and runs its tests. It shares the runtime,
+# the generator and their dependencies with `cargo build --release`. Needs Python 3.9 or later and, on the first run, a package
+# index.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=$PWD/target
@@ -9,8 +10,12 @@ venv=target/python-venv
     python3 -m venv $venv
     $venv/bin/pip install --quiet 'maturin>=1.16,<2' 'numpy>=1.22' pytest 'gymnasium>=1.0' dask distributed
 }
-cargo fmt --check --manifest-path python/Cargo.toml
+cargo fmt --check -p multibody-python
 # The package's build finds maturin on the path.
 export PATH=$PWD/$venv/bin:$PATH
-bash .ci/with-clippy.sh pip install --quiet --no-build-isolation --no-deps --force-reinstall ./python
+# Clippy reads this crate alone, because what it has read is not shared with other builds. The compiler's option makes cargo
+# compile the crate again if it has been compiled without Clippy.
+RUSTC_WRAPPER=$PWD/.ci/clippy-for-python.sh CLIPPY_ARGS=-D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__ \
+    pip install --quiet --no-build-isolation --no-deps --force-reinstall \
+    --config-settings=build-args="--locked -- -Dwarnings" ./python
 pytest -q python "$@"

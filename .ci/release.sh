@@ -4,8 +4,8 @@
 #   .ci/release.sh           compares versions, dry run of `cargo publish` without builds: seconds
 #   .ci/release.sh --full    the same with builds of what would be published, wheels, and the oldest Rust: half an hour
 #
-# To release: set the version in Cargo.toml, python/Cargo.toml and python/multibody/__init__.py, name it in CHANGELOG.md, run
-# `.ci/run` and `.ci/release.sh --full` on a clean checkout, and do what this script prints at the end.
+# To release: set the version in Cargo.toml and python/multibody/__init__.py, name it in CHANGELOG.md, run `.ci/run` and
+# `.ci/release.sh --full` on a clean checkout, and do what this script prints at the end.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 full="" wrong=0
@@ -17,15 +17,12 @@ same() { [ "$2" = "$version" ] || { echo "$1 has the version ${2:-none}, the wor
 first() { sed -n "s/^$1 *= *\"\([^\"]*\)\".*/\1/p" "$2" | head -n 1; }
 
 version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Cargo.toml)
-same "the Python package's crate" "$(first version python/Cargo.toml)"
 same "the Python package" "$(first __version__ python/multibody/__init__.py)"
 for crate in mbd-runtime mbd-codegen mbd-macros multibody; do
     for found in $(sed -n "s/^$crate = .*version = \"\([^\"]*\)\".*/\1/p" Cargo.toml runtime/Cargo.toml codegen/Cargo.toml \
         macros/Cargo.toml cli/Cargo.toml); do
         same "a dependency on $crate" "$found"
     done
-    [ "$crate" = mbd-macros ] || same "$crate in python/Cargo.lock" \
-        "$(sed -n "/^name = \"$crate\"/{n;s/version = \"\(.*\)\"/\1/p}" python/Cargo.lock)"
 done
 installed=target/python-venv/bin/python
 if [ -x $installed ] && found=$(cd / && "$OLDPWD/$installed" -c 'from importlib.metadata import version as v; print(v("multibody"))' 2> /dev/null); then
