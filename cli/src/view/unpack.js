@@ -1,10 +1,8 @@
 // The engine and the scripts in the page: compressed (LZMA, whose decoder is smaller than what it saves over the browser's own),
 // and written seven bits to a byte.
 
-/**
- * Bytes of a text whose letters carry seven bits each: those up to 127 themselves; three that HTML would change (0, CR and <) and
- * the seven bits after each of them are one letter from 256 on.
- */
+// Bytes of a text whose letters carry seven bits each: those up to 127 themselves; three that HTML would change (0, CR and <) and
+// the seven bits after each of them are one letter from 256 on.
 function letters(text) {
   const CHANGED = [0, 13, 60], out = new Uint8Array(2 * text.length);
   let [n, bits, count] = [0, 0, 0];
@@ -24,7 +22,7 @@ function letters(text) {
   return out.subarray(0, n);
 }
 
-/** Decompresses LZMA with its header of 13 bytes and an end mark (I. Pavlov's specification). */
+// Decompresses LZMA with its header of 13 bytes and an end mark (I. Pavlov's specification).
 function unlzma(input) {
   const lc = input[0] % 9, lp = Math.floor(input[0] / 9) % 5, pb = Math.floor(input[0] / 45);
   let out = new Uint8Array(1 << 22), n = 0, at = 18, range = -1 >>> 0;

@@ -31,7 +31,7 @@ pub struct Head<'a> {
     pub inputs: &'a [InputArray],
 }
 
-impl Head<'_> {
+impl<'a> Head<'a> {
     /// Whether the kernel uses the best arithmetic of the target; otherwise it gives the same bits everywhere.
     fn chooses(&self) -> bool {
         self.options.arithmetic == Arithmetic::Fast
@@ -54,12 +54,15 @@ impl Head<'_> {
         }
         let _ = writeln!(out, "    {public}fn {} {{", self.signature.declaration(rt, self.options.precision.name()));
         let arguments: Vec<String> = self.ports.iter().map(Port::argument).collect();
-        let (long, all) = (statements >= LONG, tuple(&arguments));
-        let call = match (self.chooses(), long) {
-            (true, true) => format!("{rt}::kernel::call_long::<Self, {id}, _>({all})"),
-            (true, false) => format!("{rt}::kernel::call::<Self, {id}, _>({all})"),
-            (false, _) if statements > INLINED => format!("{rt}::kernel::call_exact::<Self, {id}, {long}, _>({all})"),
-            (false, _) => format!("Self::{name}_kernel::<{rt}::kernel::Plain, 1>({})", arguments.join(", ")),
+        let (way, long) = match (self.chooses(), statements >= LONG) {
+            (true, true) => ("call_long", ""),
+            (true, false) => ("call", ""),
+            (false, true) => ("call_exact", ", true"),
+            (false, false) => ("call_exact", ", false"),
+        };
+        let call = match self.chooses() || statements > INLINED {
+            true => format!("{rt}::kernel::{way}::<Self, {id}{long}, _>({})", tuple(&arguments)),
+            false => format!("Self::{name}_kernel::<{rt}::kernel::Plain, 1>({})", arguments.join(", ")),
         };
         let _ = writeln!(out, "{}    }}", self.signature.body(rt, "0.0", &call));
         let parameters = self.parameters();
@@ -88,7 +91,7 @@ impl Head<'_> {
     }
 
     /// Places of the results in order: port and number in it.
-    pub fn places(&self) -> Vec<(&str, usize)> {
+    pub fn places(&self) -> Vec<(&'a str, usize)> {
         let places = self.ports.iter().filter(|p| p.written());
         places.flat_map(|p| (0..p.dims.iter().product()).map(move |k: usize| (p.name, k))).collect()
     }

@@ -21,6 +21,8 @@ pub struct TogetherWriter<'a> {
     plan: &'a Plan,
     program: &'a RolledProgram,
     head: Head<'a>,
+    /// Places of the results.
+    places: Vec<(&'a str, usize)>,
     names: Vec<BTreeMap<u32, String>>,
     /// Angles that depend on inputs only, by block and node: lanes of all branches, or one lane.
     angles: BTreeMap<(usize, u32), Angle>,
@@ -56,7 +58,7 @@ impl<'a> TogetherWriter<'a> {
             angles.insert(*key, Angle { row: rows + k / WIDTH, lane: Some(k % WIDTH) });
         }
         rows += single.len().div_ceil(WIDTH);
-        TogetherWriter { plan, program, head, names, angles, rows }
+        TogetherWriter { plan, program, places: head.places(), head, names, angles, rows }
     }
 
     /// Name of the function.
@@ -161,21 +163,17 @@ impl<'a> TogetherWriter<'a> {
         let (indent, _) = self.open(out, block);
         let mut last = None;
         let mut late = pairs(&block.program);
-        let (mut stores, results) = self.stores(b, block);
-        let mut store = |out: &mut String, id: Option<u32>| {
-            for line in stores.remove(&id).unwrap_or_default() {
-                let _ = writeln!(out, "{indent}{line}");
-            }
-        };
         for (id, op, label) in &block.program.steps {
-            let (text, defined) = match op {
+            let mut defined = [Some(*id), None];
+            let text = match op {
                 Op::Sin(a) | Op::Cos(a) if !self.angles.contains_key(&(b, *a)) => {
                     // The first one of a pair represents both.
-                    let Some(ids) = late.remove(a) else { continue };
-                    let pair = ids.map(|id| id.map_or("_", |id| self.names[b][&id].as_str()));
-                    (self.head.sine_and_cosine(pair, &self.names[b][a]), ids)
+                    let Some(pair) = late.remove(a) else { continue };
+                    defined = pair;
+                    let pair = pair.map(|id| id.map_or("_", |id| self.names[b][&id].as_str()));
+                    self.head.sine_and_cosine(pair, &self.names[b][a])
                 }
-                op => (format!("let {} = {};", self.names[b][id], self.value(b, block, op)), [Some(*id), None]),
+                op => format!("let {} = {};", self.names[b][id], self.value(b, block, op)),
             };
             if block.repeat.is_none() && last != Some(*label) && !matches!(op, Op::Input(_)) {
                 let _ = writeln!(out, "{indent}// {}", heading(self.plan, *label));
@@ -183,49 +181,47 @@ impl<'a> TogetherWriter<'a> {
             }
             let _ = writeln!(out, "{indent}{text}");
             for id in defined.into_iter().flatten() {
-                store(out, Some(id));
+                self.store(out, b, block, Some(id), indent);
             }
         }
-        store(out, None);
-        if block.repeat.is_some() {
-            let _ = writeln!(out, "            }}");
+        self.store(out, b, block, None, indent);
+        let Some(repeat) = &block.repeat else { return };
+        let _ = writeln!(out, "            }}");
+        for (k, target) in block.outputs.iter().enumerate() {
+            let Target::ResultOfTurn { first, stride } = *target else { continue };
+            for turn in 0..self.program.loops[repeat.run].table.len() {
+                self.give(out, "            ", first + stride * turn, &format!("branches{b}_{k}[{turn}]"));
+            }
         }
-        out.push_str(&results);
     }
 
-    /// Statements that write the results of a block, by the node that each of them writes (constants have none), and those
-    /// that hand on results of branches after their loop. A number is written as soon as it is computed: at the end
-    /// of a block most of them would have left the registers, and be read for it once more.
-    fn stores(&self, b: usize, block: &Block) -> (BTreeMap<Option<u32>, Vec<String>>, String) {
-        let places = self.head.places();
-        let give = |result: usize, value: &str| {
-            let (port, at) = places[result];
-            format!("{port}.set({at}, 0, {value});")
-        };
-        let (mut stores, mut results) = (BTreeMap::<_, Vec<String>>::new(), String::new());
-        for (k, (result, target)) in block.program.outputs.iter().zip(&block.outputs).enumerate() {
+    /// Writes the results of a block that are a node, or those that are constants. A number is written as soon as it is computed:
+    /// at the end of a block most of them would have left the registers, and be read for it once more.
+    fn store(&self, out: &mut String, b: usize, block: &Block, node: Option<u32>, indent: &str) {
+        for (k, result) in block.program.outputs.iter().enumerate() {
+            let of = if let ProgramResult::Node(id, _) = result { Some(*id) } else { None };
+            if of != node {
+                continue;
+            }
             let value = self.head.value(result, &self.names[b]);
-            let line = match *target {
-                Target::Result(result) => give(result, &value),
-                Target::Kept(slot) => format!("kept[{slot}] = {value};"),
-                Target::ResultOfTurn { first, stride } => {
-                    let turns = block.repeat.as_ref().map_or(0, |r| self.program.loops[r.run].table.len());
-                    for turn in 0..turns {
-                        let value = format!("branches{b}_{k}[{turn}]");
-                        let _ = writeln!(results, "            {}", give(first + stride * turn, &value));
-                    }
-                    format!("branches{b}_{k}[k] = {value};")
+            let _ = match block.outputs[k] {
+                Target::Result(result) => {
+                    self.give(out, indent, result, &value);
+                    continue;
                 }
-                Target::Row(_) => format!("branches{b}_{k}[k] = {value};"),
+                Target::Kept(slot) => writeln!(out, "{indent}kept[{slot}] = {value};"),
+                Target::ResultOfTurn { .. } | Target::Row(_) => {
+                    writeln!(out, "{indent}branches{b}_{k}[k] = {value};")
+                }
                 Target::Carried(_) => unreachable!("branches hand nothing on to each other"),
             };
-            let node = match result {
-                ProgramResult::Const(_) => None,
-                ProgramResult::Node(id, _) => Some(*id),
-            };
-            stores.entry(node).or_default().push(line);
         }
-        (stores, results)
+    }
+
+    /// Writes a result of the function.
+    fn give(&self, out: &mut String, indent: &str, result: usize, value: &str) {
+        let (port, at) = self.places[result];
+        let _ = writeln!(out, "{indent}{port}.set({at}, 0, {value});");
     }
 
     fn value(&self, b: usize, block: &Block, op: &Op) -> String {
