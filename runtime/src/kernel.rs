@@ -1,8 +1,9 @@
 //! Generated code for the instructions of the processor: one source text, compiled for several levels.
 //!
 //! The body of a generated function is a [`Kernel`], generic over an [`Arithmetic`]. [`call`], [`call_long`],
-//! [`call_exact`] and [`call_lanes`] run it in the version for the best level that the processor supports. With feature `std` the level is detected at run time,
-//! once, so that a plain `cargo build --release` is fast everywhere. Without it, kernels are plain code of the target.
+//! [`call_exact`] and [`call_lanes`] run it in the version for the best level that the processor supports. With feature
+//! `std` the level is detected at run time, once, so that a plain `cargo build --release` is fast everywhere. Without it,
+//! kernels are plain code of the target.
 //!
 //! | arithmetic | `a · b + c` | where |
 //! | --- | --- | --- |
