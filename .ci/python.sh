@@ -15,7 +15,7 @@ cargo fmt --check -p multibody-python
 export PATH=$PWD/$venv/bin:$PATH
 # Clippy reads this crate alone, because what it has read is not shared with other builds. The compiler's option makes cargo
 # compile the crate again if it has been compiled without Clippy.
-RUSTC_WRAPPER=$PWD/.ci/clippy-for-python.sh CLIPPY_ARGS=-D__CLIPPY_HACKERY__warnings__CLIPPY_HACKERY__ \
+RUSTC_WRAPPER=$PWD/.ci/clippy-for-python.sh bash .ci/with-clippy.sh env -u RUSTC_WORKSPACE_WRAPPER \
     pip install --quiet --no-build-isolation --no-deps --force-reinstall \
     --config-settings=build-args="--locked -- -Dwarnings" ./python
 pytest -q python "$@"
