@@ -1,5 +1,6 @@
 //! Height fields: smooth ground over a rectangular grid.
 
+use crate::lists::array;
 use crate::Scalar;
 
 /// A height field: a surface `z = h(x, y)` that is twice continuously differentiable, a bicubic spline over cells of the same
@@ -60,17 +61,16 @@ impl Field {
     /// The ground at a place in the axes of the field, m.
     pub fn at<S: Scalar>(&self, place: [S; 2]) -> Ground<S> {
         // In cells, from the beginning of the first one.
-        let at: [S; 2] = core::array::from_fn(|k| {
+        let at: [S; 2] = array(|k| {
             let middle = 0.5 * (self.points[k] as f64 - 1.0) + 3.0;
             place[k] * S::constant(1.0 / self.spacing[k]) + S::constant(middle)
         });
-        let cell: [S; 2] = core::array::from_fn(|k| at[k].look_up(self.cells[k], 0));
+        let cell: [S; 2] = array(|k| at[k].look_up(self.cells[k], 0));
         // Where all control numbers of a cell are equal, the place in it makes no difference.
-        let [x, y] = core::array::from_fn(|k| splines(at[k].look_up(self.inside[k], 0) * (at[k] - cell[k])));
+        let [x, y] = array(|k| splines(at[k].look_up(self.inside[k], 0) * (at[k] - cell[k])));
         let first = cell[1] * S::constant(self.width() as f64) + cell[0];
         let along = |order: usize, rows: &[[S; 4]; 4]| rows.map(|row| dot4(x[order], row));
-        let rows: [[S; 4]; 4] =
-            core::array::from_fn(|j| core::array::from_fn(|i| first.look_up(self.net, j * self.width() + i)));
+        let rows: [[S; 4]; 4] = array(|j| array(|i| first.look_up(self.net, j * self.width() + i)));
         let [value, slope, bend] = [0, 1, 2].map(|order| along(order, &rows));
         let [dx, dy] = self.spacing;
         let part = |x: f64, sum: S| S::constant(x) * sum;
@@ -134,7 +134,7 @@ impl Field {
         let off = match radius {
             Some(radius) => {
                 let out = radius * cosine;
-                core::array::from_fn(|k| place[k] - middle[k] - out * ground.slope[k])
+                array(|k| place[k] - middle[k] - out * ground.slope[k])
             }
             None => [S::zero(); 2],
         };
@@ -159,6 +159,6 @@ impl<S: Scalar> Foot<S> {
         let m = [[one - factor * a, -(factor * b)], [-(factor * c), one - factor * d]];
         let inverse = (m[0][0] * m[1][1] - m[0][1] * m[1][0]).reciprocal_above(S::constant(1e-6));
         let step = [m[1][1] * off[0] - m[0][1] * off[1], m[0][0] * off[1] - m[1][0] * off[0]];
-        core::array::from_fn(|k| place[k] - inverse * step[k])
+        array(|k| place[k] - inverse * step[k])
     }
 }

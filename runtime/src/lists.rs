@@ -4,6 +4,20 @@
 
 use crate::Scalar;
 
+/// What `f` gives for each index. Compilers take far less time for it than for `core::array::from_fn`, of which sweeps have
+/// hundreds for each kind of number.
+#[inline(always)]
+pub(crate) fn array<T: Copy, const N: usize>(mut f: impl FnMut(usize) -> T) -> [T; N] {
+    const { assert!(N > 0) };
+    let mut all = [f(0); N];
+    let mut k = 1;
+    while k < N {
+        all[k] = f(k);
+        k += 1;
+    }
+    all
+}
+
 /// The first `n` entries.
 #[inline(always)]
 pub(crate) fn first<T>(list: &[T], n: usize) -> &[T] {

@@ -1,5 +1,6 @@
 //! Numbers of several states, side by side.
 
+use crate::lists::array;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::system::Real;
@@ -18,7 +19,7 @@ pub struct Packed<const L: usize>(pub [f64; L]);
 impl<const L: usize> Packed<L> {
     #[inline(always)]
     fn with(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
-        Packed(core::array::from_fn(|l| f(self.0[l], other.0[l])))
+        Packed(array(|l| f(self.0[l], other.0[l])))
     }
 }
 

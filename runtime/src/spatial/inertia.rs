@@ -1,6 +1,7 @@
 //! Rigid and articulated inertia.
 
 use super::{add3, cross, Force, Mat3, Motion, Vec3};
+use crate::lists::array;
 use crate::Scalar;
 
 /// Place of entry `(i, j)` of a symmetric matrix stored as `[xx, xy, xz, yy, yz, zz]`.
@@ -53,17 +54,16 @@ impl<S: Scalar> RigidInertia<S> {
         RigidInertia {
             mass: self.mass + o.mass,
             moment: add3(self.moment, o.moment),
-            inertia: core::array::from_fn(|k| self.inertia[k] + o.inertia[k]),
+            inertia: array(|k| self.inertia[k] + o.inertia[k]),
         }
     }
 
     /// Momentum `M Ω` at the frame, N s and N m s.
     pub fn momentum(&self, w: &Motion<S>) -> Force<S> {
         let (m, s, i) = (self.mass, self.moment, &self.inertia);
-        let spin: Vec3<S> =
-            core::array::from_fn(|k| i[SYM[k][0]] * w.ang[0] + i[SYM[k][1]] * w.ang[1] + i[SYM[k][2]] * w.ang[2]);
+        let spin: Vec3<S> = array(|k| i[SYM[k][0]] * w.ang[0] + i[SYM[k][1]] * w.ang[1] + i[SYM[k][2]] * w.ang[2]);
         let drag = cross(w.ang, s);
-        Force { lin: core::array::from_fn(|k| m * w.lin[k] + drag[k]), ang: add3(cross(s, w.lin), spin) }
+        Force { lin: array(|k| m * w.lin[k] + drag[k]), ang: add3(cross(s, w.lin), spin) }
     }
 
     /// As a general 6×6 inertia.
@@ -89,9 +89,9 @@ impl<S: Scalar> ArticulatedInertia<S> {
     #[inline]
     pub fn plus(&self, o: &Self) -> Self {
         ArticulatedInertia {
-            a: core::array::from_fn(|k| self.a[k] + o.a[k]),
-            h: core::array::from_fn(|i| core::array::from_fn(|k| self.h[i][k] + o.h[i][k])),
-            j: core::array::from_fn(|k| self.j[k] + o.j[k]),
+            a: array(|k| self.a[k] + o.a[k]),
+            h: array(|i| array(|k| self.h[i][k] + o.h[i][k])),
+            j: array(|k| self.j[k] + o.j[k]),
         }
     }
 
@@ -120,12 +120,12 @@ impl<S: Scalar> ArticulatedInertia<S> {
     /// Column `k`.
     #[inline(always)]
     pub fn column(&self, k: usize) -> Force<S> {
-        Force { lin: core::array::from_fn(|i| self.get(i, k)), ang: core::array::from_fn(|i| self.get(i + 3, k)) }
+        Force { lin: array(|i| self.get(i, k)), ang: array(|i| self.get(i + 3, k)) }
     }
 
     /// `M Ω`.
     pub fn times(&self, v: &Motion<S>) -> Force<S> {
         let row = |i: usize| (1..6).fold(self.get(i, 0) * v.get(0), |sum, k| sum + self.get(i, k) * v.get(k));
-        Force { lin: core::array::from_fn(row), ang: core::array::from_fn(|i| row(i + 3)) }
+        Force { lin: array(row), ang: array(|i| row(i + 3)) }
     }
 }

@@ -5,6 +5,7 @@
 //! from child to parent ([`ElementaryTransform::force`], [`ElementaryTransform::inertia`]).
 
 use super::{cross, ArticulatedInertia, Force, Mat3, Motion, Vec3, SYM};
+use crate::lists::array;
 use crate::Scalar;
 
 /// A coordinate axis.
@@ -86,28 +87,28 @@ fn pair_back<S: Scalar>(c: S, s: S, x: S, y: S) -> (S, S) {
 
 #[inline(always)]
 fn up3<S: Scalar>(r: &Mat3<S>, x: Vec3<S>) -> Vec3<S> {
-    core::array::from_fn(|i| r[i][0] * x[0] + r[i][1] * x[1] + r[i][2] * x[2])
+    array(|i| r[i][0] * x[0] + r[i][1] * x[1] + r[i][2] * x[2])
 }
 
 #[inline(always)]
 fn down3<S: Scalar>(r: &Mat3<S>, x: Vec3<S>) -> Vec3<S> {
-    core::array::from_fn(|i| r[0][i] * x[0] + r[1][i] * x[1] + r[2][i] * x[2])
+    array(|i| r[0][i] * x[0] + r[1][i] * x[1] + r[2][i] * x[2])
 }
 
 fn full<S: Scalar>(m: &[S; 6]) -> Mat3<S> {
-    core::array::from_fn(|i| core::array::from_fn(|k| m[SYM[i][k]]))
+    array(|i| array(|k| m[SYM[i][k]]))
 }
 
 /// `R M Rᵀ` for a general matrix.
 fn congruence<S: Scalar>(r: &Mat3<S>, m: &Mat3<S>) -> Mat3<S> {
-    let rm: Mat3<S> = core::array::from_fn(|i| down3(m, r[i]));
-    core::array::from_fn(|i| core::array::from_fn(|k| rm[i][0] * r[k][0] + rm[i][1] * r[k][1] + rm[i][2] * r[k][2]))
+    let rm: Mat3<S> = array(|i| down3(m, r[i]));
+    array(|i| array(|k| rm[i][0] * r[k][0] + rm[i][1] * r[k][1] + rm[i][2] * r[k][2]))
 }
 
 /// Upper triangle of `R M Rᵀ` for a symmetric matrix: only six entries are formed.
 fn congruence_sym<S: Scalar>(r: &Mat3<S>, m: &[S; 6]) -> [S; 6] {
     let m = full(m);
-    let rm: Mat3<S> = core::array::from_fn(|i| down3(&m, r[i]));
+    let rm: Mat3<S> = array(|i| down3(&m, r[i]));
     let at = |i: usize, k: usize| rm[i][0] * r[k][0] + rm[i][1] * r[k][1] + rm[i][2] * r[k][2];
     [at(0, 0), at(0, 1), at(0, 2), at(1, 1), at(1, 2), at(2, 2)]
 }
@@ -246,9 +247,7 @@ impl<S: Scalar> ElementaryTransform<S> {
         match self {
             ElementaryTransform::Turn { axis, c, s } => ElementaryTransform::Turn { axis: *axis, c: *c, s: -*s },
             ElementaryTransform::Shift { axis, r } => ElementaryTransform::Shift { axis: *axis, r: -*r },
-            ElementaryTransform::Rotate(r) => {
-                ElementaryTransform::Rotate(core::array::from_fn(|i| core::array::from_fn(|k| r[k][i])))
-            }
+            ElementaryTransform::Rotate(r) => ElementaryTransform::Rotate(array(|i| array(|k| r[k][i]))),
         }
     }
 

@@ -3,6 +3,7 @@
 
 use super::pass::{Arguments, Results, Sweep};
 use super::{Inputs, Quantity, Sweeps, Trace};
+use crate::lists::array;
 use crate::spatial::{add3, cross, dot3, Force, Vec3};
 use crate::tree::Source;
 use crate::workspace::Workspace;
@@ -61,7 +62,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             let node = &self.tree.nodes[i];
             self.trace.at(Some(i), Quantity::Momentum);
             if let Source::State { v, .. } = node.source {
-                let arm = core::array::from_fn(|c| w.position[i][c] - com[c]);
+                let arm = array(|c| w.position[i][c] - com[c]);
                 for k in 0..node.kind.nv() {
                     let momentum = w.factor.m[i].times(&node.kind.axis(k).motion(node.ratio));
                     let turned = |x: Vec3<S>| w.rotation[i].map(|row| dot3(row, x));

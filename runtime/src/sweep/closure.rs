@@ -5,6 +5,7 @@
 //! Ω_rel = b`; where what is left free is a joint that moves with `B`, it is constant.
 
 use super::touch::Touch;
+use crate::lists::array;
 use crate::spatial::{add3, cross, dot3, scale3, Force, Mat3, Motion, Vec3};
 use crate::tree::Closure;
 use crate::workspace::Relative;
@@ -57,12 +58,12 @@ impl<S: Scalar> Relative<S> {
 
     /// A vector with components in `A`.
     pub(super) fn turned(&self, x: Vec3<S>) -> Vec3<S> {
-        core::array::from_fn(|i| dot3(self.turn[i], x))
+        array(|i| dot3(self.turn[i], x))
     }
 
     /// A wrench on `B` as one at `A`, in its components.
     pub(super) fn force(&self, f: &Force<S>) -> Force<S> {
-        let back = |x: Vec3<S>| core::array::from_fn(|k| dot3(self.axis(k), x));
+        let back = |x: Vec3<S>| array(|k| dot3(self.axis(k), x));
         Force { lin: back(f.lin), ang: back(add3(f.ang, cross(self.d, f.lin))) }
     }
 
@@ -75,7 +76,7 @@ impl<S: Scalar> Relative<S> {
             (0..3).for_each(|i| out.turn[i][k].du = rate[i]);
         }
         let rate = add3(rel.lin, cross(self.d, rel.ang));
-        out.d = core::array::from_fn(|i| Dual::new(self.d[i], rate[i]));
+        out.d = array(|i| Dual::new(self.d[i], rate[i]));
         out
     }
 }
@@ -255,9 +256,9 @@ impl<S: Scalar> Closure<S> {
             }
             // Where the normal of the ellipsoid is `-n`: its radius along `n` is the length of the semi-axes times `n`.
             Closure::RollingEllipsoid { semi_axes } => {
-                let scaled: Vec3<S> = core::array::from_fn(|k| semi_axes[k] * n[k]);
+                let scaled: Vec3<S> = array(|k| semi_axes[k] * n[k]);
                 let down = -(S::one() / dot3(scaled, scaled).sqrt());
-                core::array::from_fn(|k| down * (semi_axes[k] * scaled[k]))
+                array(|k| down * (semi_axes[k] * scaled[k]))
             }
             _ => [S::zero(); 3],
         }
@@ -336,12 +337,12 @@ impl<S: Scalar> Closure<S> {
             return None;
         }
         let column = |m: &Mat3<S>, k: usize| [m[0][k], m[1][k], m[2][k]];
-        let axes: [Vec3<S>; 3] = core::array::from_fn(|i| column(b.0, i));
+        let axes: [Vec3<S>; 3] = array(|i| column(b.0, i));
         let way = add3(b.1, scale3(-S::one(), a.1));
-        let turn = core::array::from_fn(|i| core::array::from_fn(|k| dot3(axes[i], column(a.0, k))));
-        let at = Relative { turn, d: core::array::from_fn(|i| dot3(axes[i], way)) };
+        let turn = array(|i| array(|k| dot3(axes[i], column(a.0, k))));
+        let at = Relative { turn, d: array(|i| dot3(axes[i], way)) };
         let arm = self.touch(&at).map_or_else(|| self.contact(&at), |touch| touch.at);
-        let ground = |x: Vec3<S>| core::array::from_fn(|i| dot3(b.0[i], x));
+        let ground = |x: Vec3<S>| array(|i| dot3(b.0[i], x));
         let rows = self.directions(&at);
         Some((add3(b.1, ground(arm)), [0, 1, 2].map(|k: usize| ground(rows[k].lin))))
     }
@@ -371,7 +372,7 @@ impl<S: Scalar> Closure<S> {
         if self.constant() {
             return [Force::zero(); 6];
         }
-        let both = |x: Vec3<S>, dx: Vec3<S>| core::array::from_fn(|k| Dual::new(x[k], dx[k]));
+        let both = |x: Vec3<S>, dx: Vec3<S>| array(|k| Dual::new(x[k], dx[k]));
         let rel = Motion { lin: both(rel.lin, bend.lin), ang: both(rel.ang, bend.ang) };
         let rate = |f: Force<Dual<S>>| Force { lin: f.lin.map(|x| x.du), ang: f.ang.map(|x| x.du) };
         self.map(&|x| Dual::new(x, S::zero())).direction_rates(&at.moving(way), &rel).map(rate)

@@ -8,6 +8,7 @@
 
 use super::pass::{each_node, visit_force, Sweep, SweepDirection};
 use super::{Quantity, Sweeps, Trace};
+use crate::lists::array;
 use crate::spatial::{Force, Mat3, Motion, Vec3};
 use crate::system::Row;
 use crate::tree::{Bond, Constraint, Cut, Source, Tree, TreeFrame, Unknown, PASSES};
@@ -219,10 +220,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             self.on_body(poses, frame).for_each(|step| step.pose(rot, pos));
         }
         let ((ra, pa), (rb, pb)) = (a, b);
-        let way: Vec3<S> = core::array::from_fn(|k| pb[k] - pa[k]);
+        let way: Vec3<S> = array(|k| pb[k] - pa[k]);
         let along = |k: usize, x: Vec3<S>| rb[0][k] * x[0] + rb[1][k] * x[1] + rb[2][k] * x[2];
-        let turn = core::array::from_fn(|i| core::array::from_fn(|k| along(i, [ra[0][k], ra[1][k], ra[2][k]])));
-        Relative { turn, d: core::array::from_fn(|i| along(i, way)) }
+        let turn = array(|i| array(|k| along(i, [ra[0][k], ra[1][k], ra[2][k]])));
+        Relative { turn, d: array(|i| along(i, way)) }
     }
 
     /// A wrench on the second frame and its opposite on the first, at their nodes.
@@ -562,6 +563,6 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
 /// Difference of two motions.
 pub(super) fn difference<S: Scalar>(a: &Motion<S>, b: &Motion<S>) -> Motion<S> {
-    let minus = |a: Vec3<S>, b: Vec3<S>| core::array::from_fn(|k| a[k] - b[k]);
+    let minus = |a: Vec3<S>, b: Vec3<S>| array(|k| a[k] - b[k]);
     Motion { lin: minus(a.lin, b.lin), ang: minus(a.ang, b.ang) }
 }

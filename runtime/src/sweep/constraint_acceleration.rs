@@ -4,6 +4,7 @@
 use super::constraint::difference;
 use super::pass::Sweep;
 use super::{Inputs, Quantity, Sweeps, Trace};
+use crate::lists::array;
 use crate::spatial::{add3, cross, Motion, Vec3};
 use crate::tree::{Bond, Constraint, Cut};
 use crate::workspace::Workspace;
@@ -70,9 +71,9 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let carried = add3(cross(alpha, at.d), cross(spin, add3(rel.lin, cross(spin, at.d))));
         let a_origin = add3(at.turned(aa.accel), carried);
         let along = cross(vb.ang, rel.lin);
-        let lin: Vec3<S> = core::array::from_fn(|k| ab.accel[k] - a_origin[k] - along[k]);
+        let lin: Vec3<S> = array(|k| ab.accel[k] - a_origin[k] - along[k]);
         let gyro = cross(vb.ang, spin);
-        let ang: Vec3<S> = core::array::from_fn(|k| ab.alpha[k] - alpha[k] + gyro[k]);
+        let ang: Vec3<S> = array(|k| ab.alpha[k] - alpha[k] + gyro[k]);
         let change = Motion { lin, ang };
         for k in 0..constraint.slots.len() {
             let e = w.constraints.rows[constraint.first + k].e;

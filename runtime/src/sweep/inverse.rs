@@ -4,6 +4,7 @@
 use super::newton::Accelerations;
 use super::pass::{each_node, visit_force, Sweep};
 use super::{Quantity, Sweeps, Trace};
+use crate::lists::array;
 use crate::tree::Source;
 use crate::workspace::Workspace;
 use crate::Scalar;
@@ -40,7 +41,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for (k, (&i, out)) in self.tree.joint_nodes.iter().zip(out).enumerate() {
             self.trace.at(Some(i), Quantity::Reaction);
             let f = self.on_body(&w.poses, &self.tree.frames[k]).fold(w.force[i], |f, step| step.force_back(&f));
-            *out = core::array::from_fn(|c| f.get(c));
+            *out = array(|c| f.get(c));
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::newton::ClassicMotion;
 use super::{Quantity, Sweeps, Trace};
+use crate::lists::array;
 use crate::spatial::{add3, scale3, ElementaryTransform, Mat3, Vec3};
 use crate::tree::{Freedom, Source, TreeFrame};
 use crate::workspace::Workspace;
@@ -80,7 +81,7 @@ fn column<S: Scalar>(axis: &Freedom<S>, rot: &Mat3<S>, pos: Vec3<S>) -> [S; 6] {
     // Rᵀ e × r, row a of R being Rᵀ e_a.
     let turned = |k: usize| {
         let (a, b) = ((k + 1) % 3, (k + 2) % 3);
-        core::array::from_fn(|c| pos[a] * rot[b][c] - pos[b] * rot[a][c])
+        array(|c| pos[a] * rot[b][c] - pos[b] * rot[a][c])
     };
     let (lin, ang): (Vec3<S>, Vec3<S>) = match *axis {
         Freedom::Unit(k) if k < 3 => (rot[k], [S::zero(); 3]),

@@ -7,6 +7,7 @@
 
 use super::pass::{each_node, Sweep};
 use super::{name, Inputs, Quantity, Sweeps, Trace};
+use crate::lists::array;
 use crate::spatial::{add3, cross, Axis, ElementaryTransform, Force, Motion, RigidInertia, Vec3};
 use crate::tree::{Freedom, Kind, Node, Source};
 use crate::workspace::Workspace;
@@ -190,7 +191,7 @@ impl<S: Scalar> ClassicMotion<S> {
         let (m, s, [jxx, jxy, jxz, jyy, jyz, jzz]) = (body.mass, body.moment, body.inertia);
         let (xx, yy, zz, xy, xz, yz) = (x * x, y * y, z * z, x * y, x * z, y * z);
         let b = [[-(yy + zz), xy - az, xz + ay], [xy + az, -(xx + zz), yz - ax], [xz - ay, yz + ax, -(xx + yy)]];
-        let lin = core::array::from_fn(|k| m * a[k] + (b[k][0] * s[0] + b[k][1] * s[1] + b[k][2] * s[2]));
+        let lin = array(|k| m * a[k] + (b[k][0] * s[0] + b[k][1] * s[1] + b[k][2] * s[2]));
         let spin = [
             jxx * ax + (jzz - jyy) * yz - jxy * b[2][0] + jxz * b[1][0] + jyz * (yy - zz),
             jyy * ay + (jxx - jzz) * xz + jxy * b[2][1] - jyz * b[0][1] + jxz * (zz - xx),

@@ -3,6 +3,7 @@
 
 use super::pass::{Arguments, Results, Sweep};
 use super::{Accelerations, Inputs, Quantity, Sweeps, Trace};
+use crate::lists::array;
 use crate::spatial::RigidInertia;
 use crate::tree::INERTIAL_PARAMETERS;
 use crate::workspace::Workspace;
@@ -25,8 +26,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         for (body, frame) in bodies.enumerate() {
             let Some(motion) = self.classic_frame_motion(frame, w) else { continue };
             self.trace.at(frame.node, Quantity::Effort);
-            let wrenches: [_; INERTIAL_PARAMETERS] =
-                core::array::from_fn(|k| motion.wrench(&RigidInertia::from_parameters(&unit(k))));
+            let wrenches: [_; INERTIAL_PARAMETERS] = array(|k| motion.wrench(&RigidInertia::from_parameters(&unit(k))));
             self.jacobian_columns(frame, w, |v, column| {
                 for (k, wrench) in wrenches.iter().enumerate() {
                     let along = (0..6).fold(S::zero(), |sum, c| sum + column[c] * wrench.get(c));
@@ -46,7 +46,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 
 /// The parameters of which one is 1 and the others are 0.
 fn unit<S: Scalar>(k: usize) -> [S; INERTIAL_PARAMETERS] {
-    core::array::from_fn(|i| if i == k { S::one() } else { S::zero() })
+    array(|i| if i == k { S::one() } else { S::zero() })
 }
 
 /// −1, 0 or 1 up to rounding: 0 where the velocity is smaller than 1e-30 m/s or rad/s.

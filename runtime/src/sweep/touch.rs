@@ -4,10 +4,11 @@
 //! 0 or 1 and have derivatives of zero. Distances and contact points are continuous; derivatives are those of the part
 //! that is nearest.
 
-#[cfg(feature = "height_fields")]
 use crate::field::{Ball, Field, Foot, Ground};
 #[cfg(feature = "hulls")]
 use crate::hull::{Plane, Polyhedron};
+#[cfg(feature = "height_fields")]
+use crate::lists::array;
 use crate::spatial::{add3, dot3, scale3, Vec3};
 use crate::workspace::Relative;
 use crate::Scalar;
@@ -87,7 +88,7 @@ impl<S: Scalar> Touch<S> {
     /// rounded edges and corners, and of the ball. As on a box, the distance inside is that of the nearest face.
     #[cfg(feature = "hulls")]
     pub fn ball_on_hull(at: &Relative<S>, hull: &Polyhedron, radii: &[S; 2]) -> Touch<S> {
-        let place = core::array::from_fn(|k| dot3(at.axis(k), at.d));
+        let place = array(|k| dot3(at.axis(k), at.d));
         let (mut way, mut square) = ([S::zero(); 3], S::zero());
         // The nearest place of all edges, to whose ends corners belong.
         for (k, edge) in hull.edges.iter().enumerate() {
@@ -175,7 +176,7 @@ impl<S: Scalar> Touch<S> {
     /// the ball is.
     #[cfg(feature = "height_fields")]
     pub fn ball_on_field(at: &Relative<S>, field: &Field, ball: Option<Ball<S>>) -> Touch<S> {
-        let [x, y, z] = core::array::from_fn(|k| dot3(at.axis(k), at.d));
+        let [x, y, z] = array(|k| dot3(at.axis(k), at.d));
         let Foot { ground: Ground { height, slope: [p, q], .. }, cosine, off, .. } = field.under([x, y], ball);
         let normal = at.turned([-(cosine * p), -(cosine * q), cosine]);
         let Some(Ball { radius, .. }) = ball else {

@@ -185,14 +185,14 @@ fn rewritten_chains() {
 #[test]
 fn trees_of_everything() {
     let mut nodes = 0;
-    for seed in 0..300 {
+    for seed in 0..150 {
         let all = Distribution { wrenches: 0.0, ..Distribution::everything(seed, 6 + seed as usize % 20) };
         // Nodes with parameters, mimic joints or drives stay straight-line code.
         let plain = Distribution { params: 0.0, mimic: 0.0, prescribed: 0.0, branching: 0.1, ..all.clone() };
         let distribution = if seed % 3 == 0 { all } else { plain };
         nodes += compare(&random_model(seed, &distribution), seed, &forced(seed));
     }
-    assert!(nodes > 150, "only {nodes} nodes were rolled");
+    assert!(nodes > 75, "only {nodes} nodes were rolled");
 }
 
 #[test]

@@ -153,6 +153,15 @@ pub struct Body {
     products: Option<BTreeMap<(Id, Id), Id>>,
 }
 
+/// When entries of an array are written next that move by the same from turn to turn.
+#[derive(Default)]
+struct Writes {
+    /// Any of them.
+    next: usize,
+    /// Each of them, by its place in turn 0.
+    of_entries: BTreeMap<usize, usize>,
+}
+
 /// A loop that is being recorded: first place of what it carries.
 pub struct Loop {
     turns: usize,
@@ -177,12 +186,9 @@ impl Body {
         }
     }
 
-    /// Numbers that blocks have left in the working memory are read where they are used, if they are still there then: a block
-    /// is given more of them than there are registers. In loops they are read at the beginning of a turn.
+    /// Numbers that blocks or turns have left in the working memory are read where they are used, if they are still there then: a block
+    /// is given more of them than there are registers.
     pub fn read_in_place(&mut self) {
-        if self.items.iter().any(|item| matches!(item, Item::Open { .. })) {
-            return;
-        }
         let mut last_use = vec![0; self.lanes.len()];
         for (k, item) in self.items.iter().enumerate() {
             let mut uses = |id: Id| last_use[id as usize] = k;
@@ -192,22 +198,36 @@ impl Body {
                 Item::Call(_) | Item::Open { .. } | Item::Close { .. } => {}
             }
         }
-        // When an entry is written next.
-        let mut written = BTreeMap::new();
+        // When an entry is written next, by its array, by how far it moves from turn to turn, and its place in turn 0. In the
+        // same turn, entries that move by the same are others if their places are; of those that move by others, nothing is
+        // known.
+        let mut written: BTreeMap<Array, BTreeMap<usize, Writes>> = BTreeMap::new();
         for (k, item) in self.items.iter_mut().enumerate().rev() {
             match item {
                 Item::Store(entry, id) => {
                     let all = entry.at..entry.at + self.lanes[*id as usize].count();
-                    written.extend(all.map(|at| ((entry.array, at), k)));
+                    let writes = written.entry(entry.array).or_default().entry(entry.stride).or_default();
+                    writes.next = k;
+                    writes.of_entries.extend(all.map(|at| (at, k)));
                 }
                 Item::Value(id, step) => {
-                    let Step::Load(entry @ Entry { array: Array::Rows(_) | Array::Kept, .. }) = *step else { continue };
-                    let mut all = entry.at..entry.at + self.lanes[*id as usize].count();
+                    let Step::Load(entry @ Entry { array: Array::Rows(_) | Array::Kept | Array::Spilled, at, stride }) =
+                        *step
+                    else {
+                        continue;
+                    };
+                    let all = at..at + self.lanes[*id as usize].count();
                     let last = last_use[*id as usize];
-                    if all.all(|at| written.get(&(entry.array, at)).is_none_or(|k| *k > last)) {
+                    let stays = |(moves, writes): (&usize, &Writes)| match *moves == stride {
+                        true => all.clone().all(|at| writes.of_entries.get(&at).is_none_or(|k| *k > last)),
+                        false => writes.next > last,
+                    };
+                    if written.get(&entry.array).is_none_or(|by_moves| by_moves.iter().all(stays)) {
                         *step = Step::Again(entry);
                     }
                 }
+                // No value is used on the other side.
+                Item::Open { .. } | Item::Close { .. } => written.clear(),
                 _ => {}
             }
         }

@@ -13,12 +13,12 @@ use super::encode::{self as code, fused, Assembler, General, Jump, Label, Last, 
 use super::{Lanes, Width};
 use crate::lower::{Array, Memory};
 
-/// Registers for addresses of arrays.
+/// Registers for addresses of arrays. In bodies with loops, the last one is a distance.
 const POINTERS: [General; 4] = [General::Rax, General::Rcx, General::R8, General::R9];
 
-/// Number of a loop's turn, and the distance of its entries.
+/// Number of a loop's turn, and the distances of its entries.
 const TURN: General = General::R11;
-const DISTANCE: General = General::R10;
+const DISTANCES: [General; 2] = [General::R10, General::R9];
 
 /// Where the arrays of a function are.
 pub struct Arrays<'a> {
@@ -90,8 +90,10 @@ struct Writer<'a> {
     calls: Vec<FarCall>,
     /// Arrays whose addresses are in [`POINTERS`], and when they were used last.
     pointers: [(Option<Pointer>, usize); POINTERS.len()],
-    /// By how many bytes the entries move that [`DISTANCE`] belongs to.
-    distance: Option<i32>,
+    /// How many of these there are.
+    most_pointers: usize,
+    /// By how many bytes the entries move that [`DISTANCES`] belong to, and when they were used last.
+    distances: [(Option<i32>, usize); DISTANCES.len()],
     /// Beginnings of the open loops.
     loops: Vec<Label>,
     /// The item that is being written.
@@ -122,6 +124,7 @@ pub fn write(body: &Body, width: Width, arrays: &Arrays) -> Option<Written> {
     let aligned = |at: usize| if width.states == Lanes::One { at.next_multiple_of(Lanes::Eight.count()) } else { at };
     let own = aligned(arrays.memory.len());
     let first_slot = aligned(own + body.carried);
+    let loops = body.items.iter().any(|item| matches!(item, Item::Open { .. }));
     let mut writer = Writer {
         assembler: Assembler::new(width.wide),
         width,
@@ -136,8 +139,9 @@ pub fn write(body: &Body, width: Width, arrays: &Arrays) -> Option<Written> {
         constants: BTreeMap::new(),
         numbers: 0,
         calls: Vec::new(),
-        pointers: [(None, 0); POINTERS.len()],
-        distance: None,
+        pointers: Default::default(),
+        most_pointers: POINTERS.len() - usize::from(loops),
+        distances: Default::default(),
         loops: Vec::new(),
         now: 0,
     };
@@ -170,7 +174,7 @@ impl Writer<'_> {
             Item::ExitIfSigns(id) => {
                 let x = self.in_register(id, &[])?;
                 self.assembler.exit_if_signs(self.lanes(id), x);
-                self.distance = None;
+                self.distances = Default::default();
                 self.used([id]);
                 self.forget_slots([id]);
                 Some(())
@@ -208,8 +212,8 @@ impl Writer<'_> {
             return None;
         }
         self.forget_registers();
-        self.pointers = [(None, 0); POINTERS.len()];
-        self.distance = None;
+        self.pointers = Default::default();
+        self.distances = Default::default();
         Some(())
     }
 

@@ -38,6 +38,7 @@
 //! serves for both. Derivatives of `E` are those of dual numbers through the directions of one loop; most kinds have constant
 //! directions.
 
+use crate::lists::array;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::mem::take;
@@ -211,7 +212,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let at = w.constraints.relative[index];
         let (rates, zero) = (cut.closure.direction_rates(&at, &motion), Force::zero());
         let sigma = &w.constraints.multipliers[constraint.range()];
-        let directions: [Force<S>; 6] = core::array::from_fn(|r| match r < sigma.len() {
+        let directions: [Force<S>; 6] = array(|r| match r < sigma.len() {
             true => w.constraints.rows[constraint.first + r].e,
             false => zero,
         });

@@ -1,6 +1,7 @@
 //! The freedoms of a loop, for the derivatives of mechanisms with constraints: `closed.rs` has the formulas.
 
 use super::{single, velocity, Derivatives};
+use crate::lists::array;
 use crate::spatial::{dot3, scale3, Force, Motion};
 use crate::sweep::constraint::difference;
 use crate::sweep::jacobian::before;
@@ -85,8 +86,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             path.push(LoopFreedom { node: i, second, velocity, rate, axis, inner, outer, twist });
         };
         let at = &w.constraints.relative[index];
-        let mut rot = core::array::from_fn(|i| at.axis(i));
-        let mut pos = core::array::from_fn(|i| dot3(at.axis(i), at.d));
+        let mut rot = array(|i| at.axis(i));
+        let mut pos = array(|i| dot3(at.axis(i), at.d));
         self.on_body(&w.poses, &cut.a).rev().for_each(|step| before(&step, &mut rot, &mut pos));
         self.columns_along(cut.path_a.iter().rev().copied(), (rot, pos), w, |i, k, axis| push(false, i, k, axis));
         let (mut rot, mut pos) = ([[one, o, o], [o, one, o], [o, o, one]], [o; 3]);

@@ -28,7 +28,7 @@ impl Writer<'_> {
     pub(super) fn call_if_signs(&mut self, id: Id, call: Call) -> Option<()> {
         let x = self.in_register(id, &[])?;
         let from = self.assembler.jump_if_signs(self.lanes(id), x);
-        self.distance = None;
+        self.distances = Default::default();
         self.used([id]);
         self.forget_slots([id]);
         let held = self.held.iter().enumerate().filter_map(|(register, id)| Some((register as Register, (*id)?)));

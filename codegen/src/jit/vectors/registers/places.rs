@@ -1,6 +1,6 @@
 //! Where values are: in registers, in memory, or to be read again.
 
-use super::{Known, Pointer, Writer, DISTANCE, POINTERS, TURN};
+use super::{Known, Pointer, Writer, DISTANCES, POINTERS, TURN};
 use crate::jit::vectors::body::{Entry, Id, Step};
 use crate::jit::vectors::encode::{self as code, Address, General, Last, Register};
 use crate::jit::vectors::Lanes;
@@ -187,16 +187,21 @@ impl Writer<'_> {
         };
         let index = match stride {
             0 => None,
-            _ => {
-                let step = offset(stride, size)?;
-                if self.distance != Some(step) {
-                    self.assembler.multiply(DISTANCE, TURN, step);
-                    self.distance = Some(step);
-                }
-                Some(DISTANCE)
-            }
+            _ => Some(self.distance(offset(stride, size)?)),
         };
         Some(Address { base, index, offset: offset(first + at, size)?, broadcast })
+    }
+
+    /// A register with the distance of entries that move by so many bytes from turn to turn.
+    fn distance(&mut self, step: i32) -> General {
+        let known = self.distances.iter().position(|(of, _)| *of == Some(step));
+        let at = known.unwrap_or_else(|| {
+            let at = usize::from(self.distances[1].1 < self.distances[0].1);
+            self.assembler.multiply(DISTANCES[at], TURN, step);
+            at
+        });
+        self.distances[at] = (Some(step), self.now + 1);
+        DISTANCES[at]
     }
 
     /// A register with the address of an array.
@@ -205,7 +210,7 @@ impl Writer<'_> {
         let at = match known {
             Some(at) => at,
             None => {
-                let at = (0..POINTERS.len()).min_by_key(|at| self.pointers[*at].1)?;
+                let at = (0..self.most_pointers).min_by_key(|at| self.pointers[*at].1)?;
                 let to = POINTERS[at];
                 let (table, place) = match of {
                     Pointer::Array(Array::Result(k)) => (General::Rsi, k),
