@@ -4,10 +4,11 @@
 //! 0 or 1 and have derivatives of zero. Distances and contact points are continuous; derivatives are those of the part
 //! that is nearest.
 
+#[cfg(feature = "height_fields")]
 use crate::field::{Ball, Field, Foot, Ground};
 #[cfg(feature = "hulls")]
 use crate::hull::{Plane, Polyhedron};
-#[cfg(feature = "height_fields")]
+#[cfg(any(feature = "hulls", feature = "height_fields"))]
 use crate::lists::array;
 use crate::spatial::{add3, dot3, scale3, Vec3};
 use crate::workspace::Relative;
