@@ -9,7 +9,7 @@ use super::assembly::lines;
 use super::instant::Touches;
 use super::touching::add_row;
 use super::{Contact, Effort, Mode, Touching};
-use crate::lists::{array, copy, first, get, get_or, set};
+use crate::lists::{copy, first, get, get_or, set};
 use crate::system::{system_within, Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
 use crate::Scalar;
 
@@ -502,7 +502,7 @@ impl<Y: Touching> WithContacts<Y> {
                 }
             }
             for (force, c) in self.at.forces.as_mut().iter_mut().zip(self.system.contacts()) {
-                *force = array(|i| if i < c.rows() { -get(lambda, c.row + i) } else { zero });
+                *force = core::array::from_fn(|i| if i < c.rows() { -get(lambda, c.row + i) } else { zero });
             }
         }
         self.instant = Some(instant);

@@ -473,3 +473,6 @@ impl Instructions for Body {
         (0..n).map(load).collect()
     }
 }
+
+#[cfg(test)]
+mod tests;

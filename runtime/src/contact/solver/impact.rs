@@ -6,7 +6,7 @@ use super::{
     Terms,
 };
 use crate::contact::RestitutionLaw;
-use crate::lists::{array, copy, get, part_mut, set, split};
+use crate::lists::{copy, get, part_mut, set, split};
 use crate::system::Real;
 
 /// In which order the contacts of an impact act.
@@ -256,7 +256,7 @@ fn sequential<S: Real>(problem: &Problem<S>, effort: Effort, impulses: &mut [S])
         let Some(touch) = next.1 else { return Ok(collisions) };
         let (row, rows) = (touch.contact.row, touch.contact.rows());
         let mut block = Block::of(&alone(problem), touch, impulses);
-        let own: [S; 3] = array(|k| if k < rows { get(impulses, row + k) } else { zero });
+        let own: [S; 3] = core::array::from_fn(|k| if k < rows { get(impulses, row + k) } else { zero });
         block.q = block.velocity(own);
         let found = routh::collide(&block, &touch.contact)?;
         for (p, more) in part_mut(impulses, row, rows).iter_mut().zip(found) {

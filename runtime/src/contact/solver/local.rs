@@ -1,7 +1,7 @@
 //! One contact by itself, exactly.
 
 use super::{cone, Terms, Touch};
-use crate::lists::{array, get};
+use crate::lists::get;
 use crate::system::Real;
 
 /// Points of the circle of directions between which roots are bracketed.
@@ -47,7 +47,7 @@ impl<S: Real> Block<S> {
 
     /// Velocities with the impulse `p`.
     pub fn velocity(&self, p: [S; 3]) -> [S; 3] {
-        array(|i| self.q[i] + self.w[i][0] * p[0] + self.w[i][1] * p[1] + self.w[i][2] * p[2])
+        core::array::from_fn(|i| self.q[i] + self.w[i][0] * p[0] + self.w[i][1] * p[1] + self.w[i][2] * p[2])
     }
 
     /// The tangential impulse that takes the tangential velocity `u` away.
@@ -175,7 +175,7 @@ impl<S: Real> Flow<S> {
 
     /// The velocity for a vector of some `size`, times this size.
     fn velocity(&self, [a, b]: [S; 2], size: S) -> [S; 2] {
-        array(|i| self.at[i] * size + self.turn[i][0] * a + self.turn[i][1] * b)
+        core::array::from_fn(|i| self.at[i] * size + self.turn[i][0] * a + self.turn[i][1] * b)
     }
 
     /// Its component across the vector.

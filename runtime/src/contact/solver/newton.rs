@@ -1,7 +1,7 @@
 //! A step of Newton's method on the projection equations of Alart and Curnier (1991), for all contacts at once.
 
 use super::{cone, velocities, Terms, Touch};
-use crate::lists::{array, first_mut, get, part, part_mut, set, split, swap};
+use crate::lists::{first_mut, get, part, part_mut, set, split, swap};
 use crate::system::Real;
 
 /// Added to the diagonal of equations for velocities: where contacts are redundant their matrix is singular, and any of
@@ -85,8 +85,8 @@ fn equations<'a, S: Real + 'a>(
     let (row, mass, more) = (c.row, cone::mass(problem, touch), terms.proximal(touch));
     let (least, friction) = (get(terms.least, row), c.friction);
     let prox = S::constant(PROXIMAL);
-    let p: [S; 3] = array(|i| if i < c.rows() { get(impulses, row + i) } else { zero });
-    let u: [S; 3] = array(|i| if i < c.rows() { get(v, row + i) } else { zero });
+    let p: [S; 3] = core::array::from_fn(|i| if i < c.rows() { get(impulses, row + i) } else { zero });
+    let u: [S; 3] = core::array::from_fn(|i| if i < c.rows() { get(v, row + i) } else { zero });
     let normal = p[0] - mass * u[0];
     let presses = normal > least;
     // Each line is a sum of those of `m A`, with `from` for the three rows, and of `own` at the contact's impulses.
@@ -131,7 +131,8 @@ fn equations<'a, S: Real + 'a>(
     let mut column = 0;
     for other in all {
         for j in other.contact.row..other.contact.row + other.contact.rows() {
-            let a: [S; 3] = array(|i| if i < c.rows() { get(problem.a, (row + i) * n + j) } else { zero });
+            let a: [S; 3] =
+                core::array::from_fn(|i| if i < c.rows() { get(problem.a, (row + i) * n + j) } else { zero });
             for (line, from) in lines.chunks_exact_mut(count).zip(&from) {
                 set(line, column, from[0] * a[0] + from[1] * a[1] + from[2] * a[2]);
             }
