@@ -186,8 +186,8 @@ impl Body {
         }
     }
 
-    /// Numbers that blocks or turns have left in the working memory are read where they are used, if they are still there then: a block
-    /// is given more of them than there are registers.
+    /// Numbers that blocks or turns have left in the working memory are read where they are used, if they are still there
+    /// then: a block is given more of them than there are registers.
     pub fn read_in_place(&mut self) {
         let mut last_use = vec![0; self.lanes.len()];
         for (k, item) in self.items.iter().enumerate() {
