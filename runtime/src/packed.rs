@@ -1,8 +1,8 @@
 //! Numbers of several states, side by side.
 
-use crate::lists::array;
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
+use crate::lists::array;
 use crate::system::Real;
 use crate::Scalar;
 

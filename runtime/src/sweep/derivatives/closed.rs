@@ -38,7 +38,6 @@
 //! serves for both. Derivatives of `E` are those of dual numbers through the directions of one loop; most kinds have constant
 //! directions.
 
-use crate::lists::array;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::mem::take;
@@ -46,6 +45,7 @@ use core::mem::take;
 use super::loop_path::LoopFreedom;
 use super::pairs::add;
 use super::{velocity, Derivatives};
+use crate::lists::array;
 use crate::spatial::{Force, Motion};
 use crate::sweep::{Inputs, Quantity, Sweeps, Trace};
 use crate::tree::{Bond, Closure, Constraint, Cut, Tree};
