@@ -37,7 +37,7 @@ impl Evaluation {
     /// The operations of the program as it is rewritten under a strategy.
     pub fn written(&self, elimination: EliminationStrategy) -> Written {
         let plan = PlanOptions { elimination, ..PlanOptions::default() };
-        let program = passes::run(self.program.clone(), rewrite(&Options { plan, ..Options::default() }));
+        let program = passes::operations(self.program.clone(), rewrite(&Options { plan, ..Options::default() }));
         Written { all: program.counts().total(), velocities: velocity_operations(&program) }
     }
 }

@@ -1,9 +1,11 @@
 //! The depth to which the mass matrix carries screws outward.
 
+use super::evaluation;
 use crate::options::Options;
 use crate::output::Output;
 use crate::plan::Plan;
-use crate::trace::trace;
+use crate::symbolic::passes;
+use crate::trace::{rewrite, trace};
 
 /// Largest number of nodes of a tree that is searched.
 const LARGEST: usize = 60;
@@ -15,8 +17,9 @@ pub fn choose(plan: &mut Plan) {
         return;
     }
     let cost = |plan: &Plan| {
-        let traced = trace(plan, Output::MassMatrix, &Options::default());
-        traced.map_or(usize::MAX, |traced| traced.program.counts().total())
+        let traced = trace(plan, Output::MassMatrix, &evaluation::options(Output::MassMatrix));
+        let written = traced.map(|traced| passes::operations(traced.program, rewrite(&Options::default())));
+        written.map_or(usize::MAX, |program| program.counts().total())
     };
     let mut candidate = plan.clone();
     let (mut best, mut worse) = (cost(plan), 0);

@@ -92,7 +92,7 @@ impl Tally<'_> {
                 plan.ready
             }
             Op::Mul(a, b) => {
-                let factors = [self.opened.factors_of_product(*a), self.opened.factors_of_product(*b)].concat();
+                let factors = self.opened.factors_of_product(*a, *b);
                 self.single(op);
                 self.before_last_product(factors) + latency(op)
             }

@@ -1,13 +1,12 @@
 //! The graph of operations, and symbolic scalars.
 
 use std::cell::{Cell, RefCell};
-use std::collections::HashMap;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use mbd_runtime::sweep::{Quantity, Trace};
 use mbd_runtime::Scalar;
 
-use super::hash::Words;
+use super::index::Index;
 #[cfg(feature = "height_fields")]
 use super::look_up::{LookUp, Table};
 
@@ -149,8 +148,7 @@ struct Inner {
     ops: Vec<Op>,
     labels: Vec<Label>,
     names: Vec<Option<Name>>,
-    // Entries are looked up and never iterated; the order is that of `ops`.
-    memo: HashMap<Op, u32, Words>,
+    ids: Index,
 }
 
 /// A graph of operations in the order of their first use. Equal operations exist once.
@@ -249,12 +247,12 @@ impl Graph {
 
     fn node(&self, op: Op, neg: bool) -> Expr<'_> {
         let mut inner = self.inner.borrow_mut();
-        let next = inner.ops.len() as u32;
-        let id = *inner.memo.entry(op).or_insert(next);
-        if id == next {
-            inner.ops.push(op);
-            inner.labels.push(self.label.get());
-            inner.names.push(None);
+        let Inner { ops, labels, names, ids } = &mut *inner;
+        let id = ids.id(ops, &op);
+        if id as usize == ops.len() {
+            ops.push(op);
+            labels.push(self.label.get());
+            names.push(None);
         }
         Expr::Node { graph: self, id, neg }
     }

@@ -9,6 +9,7 @@ mod cost;
 mod evaluate;
 mod expr;
 pub(crate) mod hash;
+mod index;
 #[cfg(feature = "height_fields")]
 mod look_up;
 pub mod machine;

@@ -93,13 +93,22 @@ pub struct Program {
 impl Program {
     /// The program of some results; operations that they do not need are left out.
     pub fn new(graph: &Graph, outputs: &[Expr]) -> Program {
-        let outputs: Vec<ProgramResult> = outputs
-            .iter()
-            .map(|e| match *e {
-                Expr::Const(x) => ProgramResult::Const(x),
-                Expr::Node { id, neg, .. } => ProgramResult::Node(id, neg),
-            })
-            .collect();
+        let mut created = BTreeMap::new();
+        for (op, (_, what)) in (0..graph.len() as u32).map(|id| graph.get(id)) {
+            if !matches!(op, Op::Input(_)) {
+                *created.entry(what).or_default() += 1;
+            }
+        }
+        Program { created, ..Program::rebuilt(graph, outputs) }
+    }
+
+    /// The same for a program that is rewritten, without the number of operations that sweeps made.
+    pub(super) fn rebuilt(graph: &Graph, outputs: &[Expr]) -> Program {
+        let result = |e: &Expr| match *e {
+            Expr::Const(x) => ProgramResult::Const(x),
+            Expr::Node { id, neg, .. } => ProgramResult::Node(id, neg),
+        };
+        let outputs: Vec<ProgramResult> = outputs.iter().map(result).collect();
         let mut live = vec![false; graph.len()];
         for output in &outputs {
             if let ProgramResult::Node(id, _) = output {
@@ -112,19 +121,13 @@ impl Program {
                 mark(graph, id, &mut live);
             }
         }
-        let steps = (0..live.len() as u32).filter(|&id| live[id as usize]).map(|id| {
+        let live = || (0..live.len() as u32).filter(|&id| live[id as usize]);
+        let steps = live().map(|id| {
             let (op, label) = graph.get(id);
             (id, op, label)
         });
-        let names = (0..live.len() as u32).filter(|&id| live[id as usize]);
-        let names = names.filter_map(|id| graph.name_of(id).map(|name| (id, name))).collect();
-        let mut created = BTreeMap::new();
-        for (op, (_, what)) in (0..live.len() as u32).map(|id| graph.get(id)) {
-            if !matches!(op, Op::Input(_)) {
-                *created.entry(what).or_default() += 1;
-            }
-        }
-        let mut program = Program { steps: steps.collect(), outputs, names, created };
+        let names = live().filter_map(|id| graph.name_of(id).map(|name| (id, name))).collect();
+        let mut program = Program { steps: steps.collect(), outputs, names, created: BTreeMap::new() };
         program.turn_negated_differences();
         program
     }
@@ -163,34 +166,35 @@ impl Program {
 
     /// Replaces `−(a − b)` by `b − a` where it is used as a result only.
     pub(crate) fn turn_negated_differences(&mut self) {
-        let mut results = std::collections::BTreeMap::new();
-        for output in &self.outputs {
-            if let ProgramResult::Node(id, neg) = output {
-                results.entry(*id).and_modify(|all| *all &= *neg).or_insert(*neg);
+        let mut turned = vec![false; self.width()];
+        for negative in [true, false] {
+            for output in &self.outputs {
+                match output {
+                    ProgramResult::Node(id, neg) if *neg == negative => turned[*id as usize] = negative,
+                    _ => {}
+                }
             }
         }
-        results.retain(|_, negative| *negative);
-        if results.is_empty() {
+        if !turned.contains(&true) {
             return;
         }
         for operand in self.steps.iter().flat_map(|(_, op, _)| op.operands()) {
             if let Operand::Node(id) = operand {
-                results.remove(&id);
+                turned[id as usize] = false;
             }
         }
-        let mut turned = std::collections::BTreeSet::new();
         for (id, op, _) in &mut self.steps {
-            if let (Op::Sub(a, b), true) = (*op, results.contains_key(id)) {
-                *op = Op::Sub(b, a);
-                turned.insert(*id);
+            match *op {
+                Op::Sub(a, b) if turned[*id as usize] => *op = Op::Sub(b, a),
+                _ => turned[*id as usize] = false,
             }
         }
-        for (_, name) in self.names.iter_mut().filter(|(id, _)| turned.contains(id)) {
+        for (_, name) in self.names.iter_mut().filter(|(id, _)| turned[*id as usize]) {
             name.minus = !name.minus;
         }
         for output in &mut self.outputs {
             if let ProgramResult::Node(id, neg) = output {
-                *neg &= !turned.contains(id);
+                *neg &= !turned[*id as usize];
             }
         }
     }

@@ -47,17 +47,21 @@ pub enum Rewrite {
 
 /// The program as it is to be emitted.
 pub fn run(program: Program, rewrite: Rewrite) -> Program {
+    order(operations(program, rewrite), rewrite)
+}
+
+/// The operations of the program as it is to be emitted, not yet in their order.
+pub fn operations(program: Program, rewrite: Rewrite) -> Program {
     if rewrite == Rewrite::None {
         return program;
     }
     let (collected, plain) = with_fewer(program);
-    let program = match plain {
+    match plain {
         // Long programs take too long to finish twice, and an operation is nothing to them.
         Some(plain) if plain.steps.len() < LONG => fewest(finished(collected, rewrite), finished(plain, rewrite)),
         Some(plain) => finished(fewest(collected, plain), rewrite),
         None => finished(collected, rewrite),
-    };
-    order(program, rewrite)
+    }
 }
 
 /// The program in the order in which it is to be emitted; its operations stay.

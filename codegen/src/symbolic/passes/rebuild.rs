@@ -83,9 +83,7 @@ impl<'g> Rebuilt<'g> {
             }
         };
         let outputs: Vec<Expr> = old.outputs.iter().map(result).collect();
-        let mut program = Program::new(self.graph, &outputs);
-        program.created = old.created.clone();
-        program
+        Program { created: old.created.clone(), ..Program::rebuilt(self.graph, &outputs) }
     }
 }
 

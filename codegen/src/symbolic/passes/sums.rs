@@ -63,7 +63,7 @@ pub fn regroup_copying(program: &Program, copies: &Copies) -> Regrouped {
                 pass.sum(terms)
             }
             Op::Mul(a, b) => {
-                let factors = [opened.factors_of_product(*a), opened.factors_of_product(*b)].concat();
+                let factors = opened.factors_of_product(*a, *b);
                 match pass.product(factors) {
                     Term::Value(x) => x,
                     Term::Product(x, y) => {

@@ -49,9 +49,9 @@ impl Opened {
 
     /// The terms of a sum, with inner sums split: operands with their signs, in order.
     pub fn terms(&self, op: Op) -> Vec<(Operand, bool)> {
-        let mut terms = Vec::new();
-        let mut open = vec![(op, false)];
-        while let Some((op, minus)) = open.pop() {
+        let (mut terms, mut open) = (Vec::new(), Vec::new());
+        let mut next = Some((op, false));
+        while let Some((op, minus)) = next {
             let (a, b, minus_b) = match op {
                 Op::Add(a, b) => (a, b, minus),
                 Op::Sub(a, b) => (a, b, !minus),
@@ -63,6 +63,7 @@ impl Opened {
                     _ => terms.push((operand, minus)),
                 }
             }
+            next = open.pop();
         }
         terms
     }
@@ -70,25 +71,29 @@ impl Opened {
     /// The factors of a term: those of its product if the sum may split it, otherwise the operand itself.
     pub fn factors(&self, operand: Operand) -> Vec<Operand> {
         match self.summand(operand) {
-            Some(Op::Mul(a, b)) => [self.factors_of_product(a), self.factors_of_product(b)].concat(),
+            Some(Op::Mul(a, b)) => self.factors_of_product(a, b),
             _ => vec![operand],
         }
     }
 
-    /// The factors of an operand of a product.
-    pub fn factors_of_product(&self, operand: Operand) -> Vec<Operand> {
+    /// The factors of the product of two operands.
+    pub fn factors_of_product(&self, a: Operand, b: Operand) -> Vec<Operand> {
         let mut factors = Vec::new();
-        let mut open = vec![operand];
-        while let Some(operand) = open.pop() {
-            match operand {
-                Operand::Node(id) if self.in_product[id as usize] => {
-                    if let Some(Op::Mul(a, b)) = self.ops[id as usize] {
-                        open.extend([b, a]);
-                    }
-                }
-                operand => factors.push(operand),
-            }
-        }
+        self.add_factors(a, &mut factors);
+        self.add_factors(b, &mut factors);
         factors
+    }
+
+    /// Adds the factors of an operand of a product.
+    fn add_factors(&self, operand: Operand, factors: &mut Vec<Operand>) {
+        match operand {
+            Operand::Node(id) if self.in_product[id as usize] => {
+                if let Some(Op::Mul(a, b)) = self.ops[id as usize] {
+                    self.add_factors(a, factors);
+                    self.add_factors(b, factors);
+                }
+            }
+            operand => factors.push(operand),
+        }
     }
 }
