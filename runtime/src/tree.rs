@@ -182,7 +182,7 @@ pub struct Node<S> {
     pub quarter: u8,
     /// Constant displacement along the joint axis, m.
     pub slide: S,
-    /// Whether there is such a displacement. Where it is zero by structure, a plain tree is run without it.
+    /// Whether there is such a displacement. Where it is zero by structure, numbers are run without it.
     pub slides: bool,
     /// Inertia of the bodies that move with the node, in its frame.
     pub inertia: RigidInertia<S>,

@@ -80,7 +80,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let ([px, py], slide) = (placing, shift(Axis::Z, slide));
         let steps = &mut w.steps;
         match (turns, self.elimination(i).non_rotating) {
-            (false, false) if T::PLAIN && !node.slides => steps.set(i, &node.place, 0, [turn]),
+            (false, false) if !T::LISTENS && !node.slides => steps.set(i, &node.place, 0, [turn]),
             (false, false) => steps.set(i, &node.place, 0, [slide, turn]),
             (false, true) => steps.set(i, &node.place, 0, [slide]),
             (true, false) => steps.set(i, &[], 2, [px, py, slide, turn]),

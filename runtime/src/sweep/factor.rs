@@ -181,12 +181,13 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let node = &self.tree.nodes[i];
         let u = column(&e, &f.m[i]); // U = M* E
         name::force(self.trace, "u", &u);
+        // Functions that are not compiled as part of this one get copies of `e`: it need not be kept in memory for them.
         if self.has_open(i) {
-            self.cross_open(i, &e, freedom, f);
+            self.cross_open(i, &{ e }, freedom, f);
         }
         if self.has_unknowns() {
             if let Some(g) = self.elimination(i).unknown {
-                return self.add_to_open(i, g, &e, freedom, &u.times(node.ratio), f);
+                return self.add_to_open(i, g, &{ e }, freedom, &u.times(node.ratio), f);
             }
         }
         if let Source::Drive { .. } = node.source {

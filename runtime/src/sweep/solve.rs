@@ -159,7 +159,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
         let [hat_letter, letter, rate_letter] = load.letters();
         name::motion(self.trace, hat_letter, &hat);
         for (k, &g) in self.elimination(i).solve_after.iter().enumerate().rev() {
-            self.unknown_motion(g, f, &hat, self.elimination(i).open_after(k + 1), sol);
+            // A copy: the motion itself need not be kept in memory for a function that is not compiled as part of this one.
+            self.unknown_motion(g, f, &{ hat }, self.elimination(i).open_after(k + 1), sol);
         }
         let mut omega = hat;
         each_freedom!(node.kind, rev, |k, axis| {
@@ -168,7 +169,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             self.trace.name(rate, rate_letter, "");
         });
         for (k, &g) in self.elimination(i).solve_before.iter().enumerate().rev() {
-            self.unknown_motion(g, f, &omega, self.elimination(i).open_before(k + 1), sol);
+            self.unknown_motion(g, f, &{ omega }, self.elimination(i).open_before(k + 1), sol);
         }
         if self.elimination(i).before_joint {
             omega = self.leaving(poses, i).motion(omega);
