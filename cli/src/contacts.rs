@@ -297,7 +297,7 @@ fn report_regimes(touched: &Touched, out: &mut dyn Write) -> Outcome {
     if changes.len() > SHOWN {
         writeln!(out, "  and {} more", changes.len() - SHOWN)?;
     }
-    let SteppingStatistics { steps, touched, most, residual, overlap, .. } = stepping;
+    let SteppingStatistics { steps, divided, touched, most, residual, overlap, .. } = stepping;
     if *steps == 0 {
         return Ok(());
     }
@@ -306,6 +306,9 @@ fn report_regimes(touched: &Touched, out: &mut dyn Write) -> Outcome {
         "time steps: {steps}, {touched} of them with impulses, of at most {most} contacts; residual at most {residual:.1e} of \
          the impulses, overlap at most {overlap:.1e} m or rad"
     )?;
+    if *divided > 0 {
+        writeln!(out, "divided: {divided} time steps, whose impulses did not converge at once")?;
+    }
     if regimes.closed > 0.0 {
         writeln!(
             out,

@@ -16,6 +16,8 @@
 //! Springs and dampers of the joints follow the implicit midpoint rule where the mechanism can do that
 //! ([`Touching::steps_implicitly`]), in the motion without contacts as in the answer to impulses.
 //!
+//! A step whose impulses do not converge is divided: other states in between seldom have the same difficulty.
+//!
 //! The method is of order 1 at impacts and where slip ends, of order 2 in between. Impulses never add energy: their work is
 //! that of an impact with velocities that approach no slower. What friction holds does not move.
 
@@ -41,17 +43,22 @@ const ROUNDS: u32 = 4;
 /// in the step: what moves fast errs by more.
 const OVERLAP: [f64; 2] = [1e-6, 0.01];
 
+/// Parts into which a step is divided at most.
+const PARTS: u32 = 16;
+
 /// What happened in a motion by time steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct SteppingStatistics<S = f64> {
     /// Steps.
     pub steps: u64,
-    /// Steps with impulses.
+    /// Steps that were divided, because impulses did not converge.
+    pub divided: u64,
+    /// Steps and parts of steps with impulses.
     pub touched: u64,
-    /// Steps in which other contacts had impulses than in the step before.
+    /// Steps and parts in which other contacts had impulses than in those before.
     pub changes: u64,
-    /// Steps whose restitution was reduced, so that no energy was gained.
+    /// Steps and parts whose restitution was reduced, so that no energy was gained.
     pub limited: u64,
     /// Largest number of contacts with an impulse in a step.
     pub most: u32,
@@ -66,8 +73,18 @@ pub struct SteppingStatistics<S = f64> {
 impl<S: Real> SteppingStatistics<S> {
     fn new() -> Self {
         let zero = S::zero();
-        let [steps, touched, changes, limited] = [0; 4];
-        SteppingStatistics { steps, touched, changes, limited, most: 0, lost: zero, residual: zero, overlap: zero }
+        let [steps, divided, touched, changes, limited] = [0; 5];
+        SteppingStatistics {
+            steps,
+            divided,
+            touched,
+            changes,
+            limited,
+            most: 0,
+            lost: zero,
+            residual: zero,
+            overlap: zero,
+        }
     }
 }
 
@@ -75,6 +92,8 @@ impl<S: Real> SteppingStatistics<S> {
 pub trait StepImpulses {
     /// Whether overlaps are taken away, for which impulses are found a second time in a step.
     const LIFTS: bool;
+    /// Whether steps are divided whose impulses are not found.
+    const DIVIDES: bool;
 
     /// The impulses of a problem, as [`impact`]; `impulses` has those of the last step.
     ///
@@ -94,6 +113,7 @@ pub struct ByRules;
 
 impl StepImpulses for ByRules {
     const LIFTS: bool = true;
+    const DIVIDES: bool = true;
 
     fn find<S: Real>(
         rules: &ContactRules,
@@ -130,6 +150,7 @@ pub struct FixedSweeps<const N: u32>;
 
 impl<const N: u32> StepImpulses for FixedSweeps<N> {
     const LIFTS: bool = false;
+    const DIVIDES: bool = false;
 
     fn find<S: Real>(
         _: &ContactRules,
@@ -259,6 +280,50 @@ where
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,
     ) -> Result<(), HybridError> {
+        match self.whole(system, t, h, q, p) {
+            Err(error) if I::DIVIDES && unconverged(&error) => self.divided(system, (t, h), (q, p))?,
+            result => result?,
+        }
+        self.statistics.steps += 1;
+        Ok(())
+    }
+
+    /// A step in parts, which are halved wherever one fails.
+    fn divided(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        (t, h): (Y::Scalar, Y::Scalar),
+        (q, p): (&mut Y::Coordinates, &mut Y::Momenta),
+    ) -> Result<(), HybridError> {
+        let begin = (q.clone(), p.clone());
+        let (mut done, mut part) = (0, PARTS / 2);
+        let time = |parts: u32| h * Y::Scalar::constant(f64::from(parts) / f64::from(PARTS));
+        while done < PARTS {
+            match self.whole(system, t + time(done), time(part), q, p) {
+                Ok(()) => done += part,
+                Err(error) if part > 1 && unconverged(&error) => part /= 2,
+                Err(error) => {
+                    copy(q.as_mut(), begin.0.as_ref());
+                    copy(p.as_mut(), begin.1.as_ref());
+                    return Err(error);
+                }
+            }
+        }
+        self.span = [t, t + h];
+        self.last = begin;
+        self.statistics.divided += 1;
+        Ok(())
+    }
+
+    /// A step that is not divided.
+    fn whole(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        h: Y::Scalar,
+        q: &mut Y::Coordinates,
+        p: &mut Y::Momenta,
+    ) -> Result<(), HybridError> {
         let half = Y::Scalar::constant(0.5) * h;
         self.fall(system, t, h, (q, p))?;
         system.look(t + h, &self.q, &self.p);
@@ -282,7 +347,6 @@ where
         copy(self.last.1.as_mut(), p.as_ref());
         copy(q.as_mut(), self.q.as_ref());
         copy(p.as_mut(), self.p.as_ref());
-        self.statistics.steps += 1;
         let [last, now] = &mut self.pressed;
         self.statistics.changes += u64::from(last.as_ref() != now.as_ref());
         copy(last.as_mut(), now.as_ref());
@@ -410,6 +474,11 @@ where
             *v = *v + *more;
         }
     }
+}
+
+/// Whether a step failed because impulses did not converge.
+fn unconverged(error: &HybridError) -> bool {
+    matches!(error, HybridError::Contact { error: ContactError::NoConvergence { .. }, .. })
 }
 
 /// Gap of contact `k` in the middle of the step, m or rad, from gap and rate at its end without contacts.

@@ -75,8 +75,8 @@ impl<I: StepImpulses> Stepped<I> {
         kinetic + potential
     }
 
-    fn statistics(&self) -> SteppingStatistics {
-        *self.stepping.statistics()
+    fn statistics(&self) -> &SteppingStatistics {
+        self.stepping.statistics()
     }
 }
 
@@ -211,6 +211,48 @@ fn more_sweeps_leave_less() {
     for ((few, off), (more, less)) in left.iter().zip(&left[1..]) {
         assert!(*more < 0.4 * few && *less < 0.4 * off, "{left:?}");
     }
+}
+
+/// A quadruped on springs above the ground, thrown and turned at random.
+fn thrown(seed: u64) -> Stepped {
+    let (quadruped, mut q) = shipped(include_str!("../../../models/contacts/quadruped_hop.toml"));
+    let mut rng = Rng::new(seed, 1);
+    q[2] += 0.1;
+    q[3] = rng.around(0.15);
+    q[6] = (1.0 - q[3] * q[3]).sqrt();
+    q[7..].iter_mut().for_each(|q| *q += rng.around(0.2));
+    let v: Vec<f64> = (0..18).map(|_| rng.around(0.3)).collect();
+    Stepped::new(&quadruped, &q, &v)
+}
+
+/// One of about thirty such motions has a step in which impulses do not converge; these do. (Where that changes, others of the
+/// first hundred and twenty will do as well.)
+#[test]
+fn steps_without_convergence_are_divided() {
+    let mut stepped = thrown(43);
+    stepped.run(0.15, 300);
+    let SteppingStatistics { steps, divided, residual, .. } = *stepped.statistics();
+    assert!((steps, divided) == (300, 1) && residual <= 1e-5, "{:?}", stepped.statistics());
+    let mut finer = thrown(43);
+    finer.run(0.15, 2400);
+    let off = stepped.q.iter().zip(&finer.q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    // Other motions of this kind are within 3e-3; what makes impulses hard to find drives neighbours of this one apart.
+    assert!(off < 5e-2, "{off:.1e}");
+
+    // Here a part fails after others, and the state is what it was.
+    let mut stepped = thrown(38);
+    let error = loop {
+        let (mut q, mut p) = (stepped.q.clone(), stepped.p.clone());
+        let result = stepped.stepping.step(&mut stepped.system, stepped.t, 5e-4, &mut q, &mut p);
+        if let Err(error) = result {
+            assert_eq!((q, p), (stepped.q, stepped.p));
+            break error;
+        }
+        (stepped.t, stepped.q, stepped.p) = (stepped.t + 5e-4, q, p);
+        assert!(stepped.t < 0.4, "no step fails");
+    };
+    let HybridError::Contact { time, error: ContactError::NoConvergence { .. } } = error else { panic!("{error}") };
+    assert!(time > stepped.t + 1e-4, "{time} s, from {} s", stepped.t);
 }
 
 type System = WithContacts<Mechanism>;
