@@ -6,6 +6,7 @@ use crate::Scalar;
 
 /// What `f` gives for each index. Compilers take far less time for it than for `core::array::from_fn`, of which sweeps have
 /// hundreds for each kind of number.
+#[cfg(not(target_family = "wasm"))]
 #[inline(always)]
 pub(crate) fn array<T: Copy, const N: usize>(mut f: impl FnMut(usize) -> T) -> [T; N] {
     const { assert!(N > 0) };
@@ -16,6 +17,13 @@ pub(crate) fn array<T: Copy, const N: usize>(mut f: impl FnMut(usize) -> T) -> [
         k += 1;
     }
     all
+}
+
+/// The same for WebAssembly, where size counts: the code of loops would be a fiftieth longer.
+#[cfg(target_family = "wasm")]
+#[inline(always)]
+pub(crate) fn array<T: Copy, const N: usize>(f: impl FnMut(usize) -> T) -> [T; N] {
+    core::array::from_fn(f)
 }
 
 /// The first `n` entries.
