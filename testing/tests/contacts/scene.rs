@@ -14,6 +14,11 @@ pub type Mechanism = ContactInterpreter<f64>;
 type Closed = Projection<WithContacts<Mechanism>>;
 type Method = WithPostStep<WithContacts<Mechanism>, Dop853<WithContacts<Mechanism>>, Closed>;
 
+/// Largest difference between entries of two lists.
+pub fn apart(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
 /// A motion with contacts, and its events.
 pub struct Scene {
     pub system: WithContacts<Mechanism>,
