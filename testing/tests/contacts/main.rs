@@ -7,6 +7,7 @@ mod edges;
 mod far;
 mod fields;
 mod hulls;
+mod jams;
 mod known;
 mod models;
 mod round;

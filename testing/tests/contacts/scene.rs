@@ -105,6 +105,13 @@ impl Scene {
         self.rows_at(&q, &v)[0].clone()
     }
 
+    /// The least gap of contacts with friction, m.
+    pub fn feet(&mut self) -> f64 {
+        let gaps = self.gaps();
+        let feet = self.system.system().contacts().iter().filter(|contact| contact.tangents);
+        feet.map(|contact| gaps[contact.row]).fold(f64::INFINITY, f64::min)
+    }
+
     /// Residuals and velocities of all rows at a state.
     pub fn rows_at(&mut self, q: &[f64], v: &[f64]) -> [Vec<f64>; 2] {
         let system = self.system.system_mut();

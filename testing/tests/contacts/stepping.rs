@@ -225,22 +225,28 @@ fn thrown(seed: u64) -> Stepped {
     Stepped::new(&quadruped, &q, &v)
 }
 
-/// Seven of the first 120 such motions have a step in which impulses do not converge; these two have. (Where that changes, others
-/// will do as well.)
+/// Without rounds of the solver, only the steps from the impulses of the step before find any: in these two motions they fail
+/// once. (Where that changes, most of the first 40 will do as well.)
 #[test]
 fn steps_without_convergence_are_divided() {
-    let mut stepped = thrown(43);
-    stepped.run(0.15, 300);
+    let briefly = |seed| {
+        let mut stepped = thrown(seed);
+        stepped.stepping.rules.effort = ContactEffort::ToTolerance { tolerance: 1e-11, rounds: 0 };
+        stepped
+    };
+    let mut stepped = briefly(9);
+    stepped.run(0.4, 800);
     let SteppingStatistics { steps, divided, residual, .. } = stepped.statistics();
-    assert!((steps, divided) == (300, 1) && residual <= 1e-5, "{:?}", stepped.statistics());
-    let mut finer = thrown(43);
-    finer.run(0.15, 2400);
-    let off = apart(&stepped.q, &finer.q);
-    // Other motions of this kind are within 3e-3; what makes impulses hard to find drives neighbours of this one apart.
-    assert!(off < 5e-2, "{off:.1e}");
+    assert!((steps, divided) == (800, 1) && residual <= 1e-11, "{:?}", stepped.statistics());
+    let mut whole = thrown(9);
+    whole.run(0.4, 800);
+    assert_eq!(whole.statistics().divided, 0);
+    let off = apart(&stepped.q, &whole.q);
+    // Errors of such motions with these steps are up to 3e-3.
+    assert!(off < 5e-3, "{off:.1e}");
 
     // Here a part fails after others, and the state is what it was.
-    let mut stepped = thrown(38);
+    let mut stepped = briefly(1);
     let error = loop {
         let (mut q, mut p) = (stepped.q.clone(), stepped.p.clone());
         let result = stepped.stepping.step(&mut stepped.system, stepped.t, 5e-4, &mut q, &mut p);
@@ -253,6 +259,18 @@ fn steps_without_convergence_are_divided() {
     };
     let HybridError::Contact { time, error: ContactError::NoConvergence { .. } } = error else { panic!("{error}") };
     assert!(time > stepped.t + 1e-4, "{time} s, from {} s", stepped.t);
+}
+
+/// With all rounds, impulses are found in every step of all these motions; before Newton's method began at random impulses, seven
+/// of the first 120 had steps in which they were not.
+#[test]
+fn impulses_of_thrown_quadrupeds_are_found() {
+    for seed in [26, 38, 43, 87] {
+        let mut stepped = thrown(seed);
+        stepped.run(0.4, 800);
+        let SteppingStatistics { divided, residual, .. } = stepped.statistics();
+        assert!(divided == 0 && residual <= 1e-11, "{seed}: {:?}", stepped.statistics());
+    }
 }
 
 type System = WithContacts<Mechanism>;
@@ -347,42 +365,6 @@ fn what_events_cannot_resolve_is_stepped_over() {
     assert!(change.time < landing && landing - change.time < 0.1, "{change:?}");
     assert!((q[2] - 0.1).abs() < 3e-3, "{q:?}");
     assert!((q[0] - 0.3 * landing).abs() < 1e-3, "{q:?}");
-}
-
-#[test]
-fn a_start_that_events_cannot_resolve_is_stepped_over() {
-    // A rod whose lower end slides on the floor ahead of it (Painlevé): with a pivot of 1 + 3 cos² − 3 µ sin cos < 0, friction
-    // presses the end down faster than the floor can lift it, and no forces let it slide on.
-    let rod = model(
-        r#"
-body = [{ name = "rod", mass = 1, inertia = [0.001, 0.3333333333333333, 0.3333333333333333] }]
-joint = [{ name = "rod", type = "planar", parent = "ground", child = "rod", rpy = [1.5707963267948966, 0, 0] }]
-shape = [{ name = "floor", type = "plane" }, { name = "end", type = "point", body = "rod", xyz = [-1, 0, 0] }]
-contact = [{ name = "end", between = ["floor", "end"], friction = 2 }]
-"#,
-    );
-    let angle = 1.1_f64;
-    let start = [0.0, angle.sin(), angle];
-    // Velocities along the floor, in the rod's axes.
-    let begin = |choice, speed: f64| {
-        let v = [speed * angle.cos(), -speed * angle.sin(), 0.0];
-        Chosen::try_new(&rod, RegimeRules::new(choice, 1e-3), &start, &v)
-    };
-    for (speed, wedged) in [(1.0, false), (-1.0, true)] {
-        let events = begin(RegimeChoice::Events, speed).map(|_| ());
-        let failed = matches!(events, Err(HybridError::Contact { error: ContactError::Wedged { .. }, .. }));
-        assert_eq!(failed, wedged, "{events:?}");
-        let mut motion = begin(RegimeChoice::Automatic, speed).unwrap();
-        assert_eq!(motion.motion.regime() == Regime::TimeSteps, wedged);
-        let energy = |motion: &mut Chosen, q: &Vec<f64>, p: &Vec<f64>| {
-            let (kinetic, potential) = motion.system.energies(q, p);
-            kinetic + potential
-        };
-        let (q, p) = motion.run(0.0);
-        let before = energy(&mut motion, &q, &p);
-        let (q, p) = motion.run(0.1);
-        assert!(energy(&mut motion, &q, &p) <= before + 1e-12);
-    }
 }
 
 #[test]

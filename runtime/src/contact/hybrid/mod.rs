@@ -1,6 +1,7 @@
 //! Motion with contacts: steps of any method between events, and what happens at the events.
 
 mod apart;
+mod jam;
 mod land;
 mod resolve;
 mod saltation;
@@ -66,6 +67,8 @@ pub enum Cause {
     Slipped,
     /// A sliding contact came to rest.
     Stopped,
+    /// Friction would press a sliding contact without bound (Painlevé).
+    Jammed,
 }
 
 impl Cause {
@@ -76,6 +79,7 @@ impl Cause {
             Cause::Unloaded => "opens",
             Cause::Slipped => "slips",
             Cause::Stopped => "stops",
+            Cause::Jammed => "jams",
         }
     }
 }
@@ -114,6 +118,8 @@ pub struct ContactStatistics {
     pub settled: u64,
     /// Impacts whose expansion was reduced, so that no energy was gained.
     pub limited: u64,
+    /// Impacts without an approach, of contacts that friction jams.
+    pub jams: u64,
     /// Kinetic energy that impacts have taken, J.
     pub lost: f64,
     /// Largest relative residual of an impact.
@@ -513,7 +519,7 @@ where
         }
         if let Err(error) = solver.advance(system, t_end) {
             solver.state(system, &mut start.1, &mut start.2);
-            return Err(error.into());
+            return self.jam_at_start(system, error, observer).map(Some);
         }
         if let Some(steps) = self.statistics.steps.get_mut(system.system().way() as usize) {
             *steps += 1;

@@ -55,7 +55,10 @@ where
         }
         let own = !system.redundant || system.shares() || found.cause == Cause::Stopped;
         self.forced = own.then(|| (found.contact, found.cause, system.force(found.contact)));
-        self.settle_modes(system, t, Some(&mut event))?;
+        match found.cause {
+            Cause::Jammed => self.jam_pulling(system, t, &mut event)?,
+            _ => self.settle_modes(system, t, Some(&mut event))?,
+        }
         self.forced = None;
         event.modes = [before, system.mode(found.contact)];
         // Forces of redundant contacts may have been redistributed, and nothing else.
@@ -67,7 +70,7 @@ where
 
     /// Frees momenta of the multipliers that they have collected under a method that does not project them: a contact that
     /// opens would make velocities of these. What is projected differs by rounding, and is left as it is.
-    fn free_momenta(&mut self, system: &WithContacts<Y>) {
+    pub(super) fn free_momenta(&mut self, system: &WithContacts<Y>) {
         let zero = Y::Scalar::zero();
         let largest = |most: Y::Scalar, x: Y::Scalar| if x.abs() > most { x.abs() } else { most };
         let free = system.p.as_ref();
@@ -80,7 +83,7 @@ where
     }
 
     /// Counts the events at one instant.
-    fn crowd(&mut self, t: Y::Scalar) -> Result<(), HybridError> {
+    pub(super) fn crowd(&mut self, t: Y::Scalar) -> Result<(), HybridError> {
         let (last, count) = self.crowded;
         let same = !((t - last).to_f64() > 4.0 * Y::Scalar::epsilon() * t.to_f64().abs());
         self.crowded = (t, if same { count + 1 } else { 0 });
@@ -96,14 +99,19 @@ where
         &mut self,
         system: &mut WithContacts<Y>,
         t: Y::Scalar,
-        event: Option<&mut ContactEvent<Y::Scalar>>,
+        mut event: Option<&mut ContactEvent<Y::Scalar>>,
     ) -> Result<(), HybridError> {
         self.take_touching(system);
         self.fill_all(system);
         self.mind_near(system);
-        let event = self.collide(system, t, event)?;
-        self.stay(system, t, event.as_ref().map(|impact| impact.energy));
-        self.select(system, t)?;
+        let impact = self.collide(system, t, event.as_deref_mut())?;
+        self.stay(system, t, impact.as_ref().map(|impact| impact.energy));
+        self.select_or_jam(system, t, event)?;
+        self.begin_modes(system, t)
+    }
+
+    /// Takes the modes that were selected; the motion starts again with them.
+    pub(super) fn begin_modes(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar) -> Result<(), HybridError> {
         copy(self.before.as_mut(), system.modes());
         self.take_modes(system, t);
         // Each round takes energy; the directions of the last one are noticed by the next step, if they are still wrong.
@@ -112,7 +120,7 @@ where
             if !(0..self.count(system)).any(|k| system.is_turned(k)) {
                 break;
             }
-            self.select(system, t)?;
+            self.select_or_jam(system, t, None)?;
             self.take_modes(system, t);
         }
         let changed = self.before.as_ref().iter().zip(system.modes()).filter(|(old, new)| old != new);
@@ -130,7 +138,7 @@ where
     }
 
     /// Takes into the problem what is closed or touches without departing.
-    fn take_touching(&mut self, system: &WithContacts<Y>) {
+    pub(super) fn take_touching(&mut self, system: &WithContacts<Y>) {
         self.touching.count = 0;
         for k in 0..self.count(system) {
             let near = system.gap(k).to_f64() <= self.rules.touching && !self.ignores(k);
@@ -176,22 +184,26 @@ where
         let options = ImpactOptions { effort: self.rules.effort, order: self.rules.order, ..ImpactOptions::default() };
         let result = impact(&problem, &options, impulses, work)
             .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
-        system.kick(touching.order(), touching.impulses.as_ref());
-        copy(self.p.as_mut(), system.p.as_ref());
-        self.note(&result);
         if let Some(event) = event {
             event.approach = -system.gap_rate(event.contact);
             event.rest = rest;
             event.impact = Some(result);
         }
-        // Velocities after the impact, with no contact held.
-        system.release();
-        system.look(t, &self.q, &self.p);
+        self.statistics.impacts += 1;
+        self.strike(system, t, &result);
         Ok(Some(result))
     }
 
+    /// Gives the mechanism the impulses of an impact. Velocities after it are those with no contact held.
+    pub(super) fn strike(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, result: &Impact<Y::Scalar>) {
+        system.kick(self.touching.order(), self.touching.impulses.as_ref());
+        copy(self.p.as_mut(), system.p.as_ref());
+        self.note(result);
+        system.release();
+        system.look(t, &self.q, &self.p);
+    }
+
     fn note(&mut self, result: &Impact<Y::Scalar>) {
-        self.statistics.impacts += 1;
         self.statistics.lost -= result.energy.to_f64();
         self.statistics.limited += u64::from(result.limited.is_some());
         self.statistics.residual = self.statistics.residual.max(result.certificate.residual.to_f64());
@@ -230,7 +242,7 @@ where
     }
 
     /// Keeps in the problem the contacts whose bodies do not depart, and notes the departures of the others.
-    fn stay(&mut self, system: &WithContacts<Y>, t: Y::Scalar, impact: Option<Y::Scalar>) {
+    pub(super) fn stay(&mut self, system: &WithContacts<Y>, t: Y::Scalar, impact: Option<Y::Scalar>) {
         let zero = Y::Scalar::zero();
         let taken = self.touching.count;
         let fastest = (0..taken).fold(zero, |most, i| {

@@ -299,6 +299,9 @@ where
     {
         let (k, cause, t) = (event.contact, event.cause, Dual::new(event.time, S::zero()));
         let time = event.time.to_f64();
+        if cause == Cause::Jammed {
+            return Err(SaltationError::Jammed { time, contact: k });
+        }
         if redundant && matches!(cause, Cause::Unloaded | Cause::Slipped) {
             return Err(SaltationError::Redundant { time, contact: k });
         }

@@ -46,6 +46,13 @@ pub enum SaltationError {
         /// The contact.
         contact: usize,
     },
+    /// Friction jams a contact: its force has no bound before.
+    Jammed {
+        /// Time, s.
+        time: f64,
+        /// The contact.
+        contact: usize,
+    },
     /// In the direction of a tangent's start, a closed contact opens or its bodies overlap.
     LeavesContact {
         /// The contact.
@@ -98,6 +105,10 @@ impl core::fmt::Display for SaltationError {
             SaltationError::Redundant { time, contact } => write!(
                 f,
                 "contact {contact} changes its mode at t = {time} s by forces that are not unique: use fewer contacts"
+            ),
+            SaltationError::Jammed { time, contact } => write!(
+                f,
+                "friction jams contact {contact} at t = {time} s: the motion has no derivative there; reduce the friction, or end sooner"
             ),
             SaltationError::LeavesContact { contact, derivative } => write!(
                 f,

@@ -16,6 +16,8 @@ const MOST_STRETCHES: f64 = 1e6;
 pub(super) const TURN: f64 = 1.0;
 /// Speed of slip, m/s, below which bodies that slide ever more slowly may come to rest.
 const STANDSTILL: f64 = 1e-10;
+/// Part of the force at the end of a stretch by which a contact pulls at its start, if it does not just begin to.
+const PULLS: f64 = 1e-3;
 /// How often a stretch is halved in search of a point where a gap is positive, and another function.
 const HALVINGS: [u32; 2] = [40, 4];
 
@@ -262,8 +264,9 @@ where
         self.solver.dense(system, theta, &mut self.q, &mut self.p);
         system.look(t + theta * h, &self.q, &self.p);
         self.touching.take_closed(system);
-        self.select(system, t + theta * h)?;
-        Ok(self.touching.modes.as_ref() == system.modes())
+        // Where there are no forces, friction jams a contact: an event.
+        let found = self.select(system, t + theta * h).is_ok();
+        Ok(found && self.touching.modes.as_ref() == system.modes())
     }
 
     /// Takes the end of a stretch for the start of the next one.
@@ -311,6 +314,10 @@ where
             start = match self.positive(system, k, (from, end.0), value) {
                 Some(start) => start,
                 None if mode == Mode::Open => return self.sinks(system, k, (from, at_a), end),
+                // The normal force has gone through infinity, not through zero.
+                None if which == 0 && at_a < Y::Scalar::constant(PULLS) * at_b && system.slides_on(k) => {
+                    return Some(Found { contact: k, cause: Cause::Jammed, theta: from });
+                }
                 // Friction would act along the slip: the direction is taken anew.
                 None if which == 1 && at_a < zero && system.slides_on(k) => {
                     return Some(Found { contact: k, cause, theta: from });

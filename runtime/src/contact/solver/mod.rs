@@ -156,6 +156,10 @@ const STEPS: u32 = 8;
 const NEAR: u32 = 4;
 /// Lengths of a step, each half of the last, of which the first that reduces the residual is taken.
 const LENGTHS: u32 = 5;
+/// Random starts of Newton's method where sweeps do not reach a solution, and full steps from each of them. Where sweeps went
+/// round in circles in problems of four feet, every second to tenth start led to a solution.
+const STARTS: u32 = 64;
+const FAR: u32 = 24;
 
 /// Computes the impulses of a problem; `impulses` has a number for each row, the start of the iteration and its result,
 /// and `work` [`work_len`] numbers.
@@ -335,14 +339,32 @@ fn iterate<S: Real>(
         }
         Effort::ToTolerance { tolerance, rounds } => (tolerance.max(16.0 * S::epsilon()), rounds),
     };
-    let done = |progress: Progress<S>| Certificate {
-        residual: progress.worst.1,
-        sweeps: progress.sweeps,
-        newton: progress.newton,
-    };
-    let plain = Terms { problem, least, alpha: zero, anchor };
-    if approach(&plain, tolerance, PLAIN.min(rounds), impulses, &mut progress, work)? {
-        return Ok(done(progress));
+    let found = by_sweeps(problem, least, (tolerance, rounds), anchor, impulses, &mut progress, work);
+    let worst = progress.worst;
+    let plain = Terms { problem, least, alpha: zero, anchor: &[] };
+    // Friction may wedge a contact at the impulses of a sweep, and not at a solution.
+    if found == Ok(true) || rounds > 0 && elsewhere(&plain, tolerance, impulses, &mut progress, work) {
+        let Progress { worst, sweeps, newton } = progress;
+        return Ok(Certificate { residual: worst.1, sweeps, newton });
+    }
+    found?;
+    let (touch, residual) = worst;
+    Err(ContactError::NoConvergence { touch, residual: residual.to_f64(), sweeps: progress.sweeps })
+}
+
+/// Sweeps and steps of Newton's method; whether they reach a tolerance.
+fn by_sweeps<S: Real>(
+    problem: &Problem<S>,
+    least: &[S],
+    (tolerance, rounds): (f64, u32),
+    anchor: &mut [S],
+    impulses: &mut [S],
+    progress: &mut Progress<S>,
+    work: &mut [S],
+) -> Result<bool, ContactError> {
+    let plain = Terms { problem, least, alpha: S::zero(), anchor: &[] };
+    if approach(&plain, tolerance, PLAIN.min(rounds), impulses, progress, work)? {
+        return Ok(true);
     }
     // Proximal steps: each is a problem with a larger diagonal, which is easier.
     let mut alpha = S::constant(PROXIMAL);
@@ -350,15 +372,13 @@ fn iterate<S: Real>(
     for _ in 0..rounds {
         copy(anchor, impulses);
         let terms = Terms { problem, least, alpha, anchor };
-        let reached = approach(&terms, 0.1 * tolerance, PLAIN, impulses, &mut progress, work)?;
-        let plain = Terms { problem, least, alpha: zero, anchor };
+        let reached = approach(&terms, 0.1 * tolerance, PLAIN, impulses, progress, work)?;
         if progress.reaches(&plain, tolerance, impulses, work) {
-            return Ok(done(progress));
+            return Ok(true);
         }
         alpha = alpha * S::constant(if reached { 0.5 } else { 4.0 });
     }
-    let Progress { worst, sweeps, .. } = progress;
-    Err(ContactError::NoConvergence { touch: worst.0, residual: worst.1.to_f64(), sweeps })
+    Ok(false)
 }
 
 /// Tells of lists of other lengths than the number of rows asks for, and of contacts beyond it.
@@ -422,6 +442,36 @@ fn approach<S: Real>(
         }
     }
     Ok(false)
+}
+
+/// Full steps of Newton's method from random impulses within the friction cones; whether they reach a tolerance.
+fn elsewhere<S: Real>(
+    terms: &Terms<S>,
+    tolerance: f64,
+    impulses: &mut [S],
+    progress: &mut Progress<S>,
+    work: &mut [S],
+) -> bool {
+    let problem = terms.problem;
+    let largest = problem.b.iter().fold(S::zero(), |most, b| if b.abs() > most { b.abs() } else { most });
+    let mut state = 1_u32;
+    let mut random = || {
+        // Numerical Recipes' generator, whose upper bits are good enough.
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        S::constant(f64::from(state >> 8) / f64::from(1_u32 << 24))
+    };
+    (0..STARTS).any(|start| {
+        let size = S::constant(0.25 * f64::from(1_u32 << (2 * (start % 4)))) * largest;
+        for touch in problem.touches {
+            let c = touch.contact;
+            let normal = random() * size * cone::mass(problem, touch);
+            set(impulses, c.row, normal);
+            for row in c.row + 1..c.row + c.rows() {
+                set(impulses, row, (random() - S::constant(0.5)) * c.friction * normal);
+            }
+        }
+        improve(terms, tolerance, (FAR, 1), impulses, progress, work)
+    })
 }
 
 /// Steps of Newton's method, until the residual is below a tolerance; whether it is. With several `lengths`, until a step does
@@ -533,7 +583,7 @@ fn velocities<S: Real>(terms: &Terms<S>, impulses: &[S], v: &mut [S]) {
 }
 
 /// Change of the kinetic energy by impulses, `bᵀP + ½ PᵀA P`, J.
-fn energy<S: Real>(problem: &Problem<S>, impulses: &[S]) -> S {
+pub(super) fn energy<S: Real>(problem: &Problem<S>, impulses: &[S]) -> S {
     let half = S::constant(0.5);
     let each = impulses.iter().enumerate().zip(problem.b);
     each.fold(S::zero(), |sum, ((row, p), b)| sum + *p * (half * (*b + velocity(problem, row, impulses))))

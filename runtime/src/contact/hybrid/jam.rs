@@ -1,0 +1,207 @@
+//! Contacts that friction jams: Painlevé's situations.
+//!
+//! Where pressing a sliding contact together makes its bodies approach faster, no finite force is consistent with rigid
+//! bodies (Painlevé, C. R. Acad. Sci. Paris 121, 1895). Compression then grows although nothing approaches, and takes the
+//! slip away, or turns it, in no time: an *impact without collision* (Lecornu, 1905; Génot and Brogliato, Eur. J. Mech. A 18,
+//! 1999). Its impulses are those of a plastic impact in which the bodies approach by as little as can be told from rounding.
+//! A motion comes to such a place by an event, or while it slides: the normal force then grows without bound, and steps
+//! shrink without end.
+
+use super::{Cause, ContactEvent, ContactObserver, Hybrid, HybridError};
+use crate::contact::solver::energy;
+use crate::contact::{solve, ContactError, Impact, Touching, WithContacts};
+use crate::error::StepError;
+use crate::integrate::Stepper;
+use crate::lists::{copy, get, get_or, set};
+use crate::system::Real;
+use crate::Scalar;
+
+/// Largest speed that the short time of a jam leads to by itself: a part of the speed that there is, and m/s.
+const SEED: [f64; 2] = [1e-9, 1e-12];
+/// Parts by which coefficients of friction are raised, one after the other, until a contact jams: where its force has only
+/// begun to grow without bound, friction would jam it a little later.
+const RAISED: [f64; 5] = [0.0, 1e-6, 1e-5, 1e-4, 1e-3];
+/// Part of the largest force that is left after a jam, at most, where steps have shrunk before it.
+const LEFT: f64 = 0.1;
+
+impl<Y, M> Hybrid<Y, M>
+where
+    Y: Touching,
+    M: Stepper<WithContacts<Y>>,
+{
+    /// [`Hybrid::select`], after a jam where friction leaves no forces.
+    pub(super) fn select_or_jam(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        event: Option<&mut ContactEvent<Y::Scalar>>,
+    ) -> Result<(), HybridError> {
+        match self.select(system, t) {
+            Ok(()) => Ok(()),
+            Err(error) => self.jam(system, t, &RAISED, event, |_| true, error),
+        }
+    }
+
+    /// Jams a contact that pulls, because its normal force has gone through infinity.
+    pub(super) fn jam_pulling(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        event: &mut ContactEvent<Y::Scalar>,
+    ) -> Result<(), HybridError> {
+        self.take_touching(system);
+        self.fill_all(system);
+        self.mind_near(system);
+        let error = ContactError::Wedged { touch: event.contact, pivot: 0.0 };
+        let error = HybridError::Contact { time: t.to_f64(), error };
+        let [_, raised @ ..] = &RAISED;
+        self.jam(system, t, raised, Some(event), |_| true, error)?;
+        self.begin_modes(system, t)
+    }
+
+    /// Jams where the steps of the integration have shrunk to the state in `self.start`, if a contact slides there.
+    pub(super) fn jam_at_start(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        error: StepError,
+        observer: &mut impl ContactObserver<Y>,
+    ) -> Result<ContactEvent<Y::Scalar>, HybridError> {
+        if !(system.rubs && matches!(error, StepError::StepTooSmall { .. })) {
+            return Err(error.into());
+        }
+        let (t, zero) = (self.start.0, Y::Scalar::zero());
+        self.crowd(t)?;
+        copy(self.q.as_mut(), self.start.1.as_ref());
+        copy(self.p.as_mut(), self.start.2.as_ref());
+        system.look_at_all(t, &self.q, &self.p);
+        self.free_momenta(system);
+        system.loads(t, &self.q, true);
+        let (mut contact, mut most) = (0, zero);
+        for k in 0..self.count(system) {
+            let force = system.force(k)[0].abs();
+            if system.slides_on(k) && force > most {
+                (contact, most) = (k, force);
+            }
+        }
+        let before = system.mode(contact);
+        self.touching.take_closed(system);
+        self.fill_all(system);
+        self.mind_near(system);
+        let mut event = ContactEvent {
+            time: t,
+            contact,
+            cause: Cause::Jammed,
+            modes: [before; 2],
+            approach: zero,
+            impact: None,
+            rest: None,
+        };
+        let finite = |hybrid: &Self| {
+            let forces = hybrid.touching.impulses.as_ref().iter().take(hybrid.touching.rows());
+            forces.fold(zero, |most, f| if f.abs() > most { f.abs() } else { most }) < Y::Scalar::constant(LEFT) * most
+        };
+        self.jam(system, t, &RAISED, Some(&mut event), finite, error.into())?;
+        self.begin_modes(system, t)?;
+        event.modes = [before, system.mode(contact)];
+        self.statistics.events += 1;
+        observer.event(system, &event);
+        Ok(event)
+    }
+
+    /// Jams, with friction raised by as little as leads to forces that are `enough`. `error` is the reason, which is given
+    /// back where there are no such.
+    fn jam(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        raised: &[f64],
+        mut event: Option<&mut ContactEvent<Y::Scalar>>,
+        enough: impl Fn(&Self) -> bool,
+        error: HybridError,
+    ) -> Result<(), HybridError> {
+        self.statistics.impacts += 1;
+        self.statistics.jams += 1;
+        for raised in raised {
+            let impact = self.press(system, t, *raised)?;
+            if let Some(event) = event.as_deref_mut() {
+                let before = event.impact.map_or(Y::Scalar::zero(), |impact| impact.energy);
+                event.impact = Some(Impact { energy: before + impact.energy, ..impact });
+            }
+            self.forced = None;
+            if self.select(system, t).is_ok() && enough(self) {
+                return Ok(());
+            }
+        }
+        Err(error)
+    }
+
+    /// The impulses of a jam at the state that was looked at last, of the contacts in the problem and of those whose gaps are
+    /// zero there: those of an implicit time step that is as short as rounding errors let it be. Friction of contacts that
+    /// slide is `raised` by a part.
+    fn press(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        raised: f64,
+    ) -> Result<Impact<Y::Scalar>, HybridError> {
+        let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
+        self.touching.begins.as_mut().fill(false);
+        for i in 0..self.touching.count {
+            let k = self.touching.contact(i);
+            set(self.touching.begins.as_mut(), k, true);
+        }
+        self.touching.count = 0;
+        for k in 0..self.count(system) {
+            let near = system.gap(k).to_f64() <= self.rules.touching && !self.ignores(k);
+            if near || get_or(self.touching.begins.as_ref(), k, false) {
+                self.touching.take(system, k);
+            }
+        }
+        self.touching.assemble(system, t, &self.q, false);
+        self.touching.free_accelerations(system, t, &self.q);
+        let rows = self.touching.rows();
+        let larger = |most: Y::Scalar, x: Y::Scalar| if x.abs() > most { x.abs() } else { most };
+        let accelerations = self.touching.b.as_ref().iter().take(rows);
+        let most = accelerations.fold(zero, |most, a| larger(most, *a));
+        let mut fastest = zero;
+        for i in 0..self.touching.count {
+            let k = self.touching.contact(i);
+            fastest = larger(larger(fastest, system.speed(k)), system.gap_rate(k));
+        }
+        let seed = Y::Scalar::constant(SEED[0]) * fastest + Y::Scalar::constant(SEED[1]);
+        let time = if most > zero { seed / most } else { zero };
+        for i in 0..self.touching.count {
+            let k = self.touching.contact(i);
+            let c = system.contact(k);
+            let Some(touch) = self.touching.problem.as_mut().get_mut(i) else { continue };
+            touch.contact.restitution = zero;
+            if system.speed(k).to_f64() > self.rules.slip {
+                touch.contact.friction = c.friction * (one + Y::Scalar::constant(raised));
+            }
+            for j in 0..c.rows() {
+                let row = touch.contact.row + j;
+                // The gaps of what stays closed do not change.
+                let stays = j == 0 && get_or(self.touching.begins.as_ref(), k, false);
+                let v = if stays { zero } else { get(system.at.velocities.as_ref(), c.row + j) };
+                let begun = v + time * get(self.touching.b.as_ref(), row);
+                set(self.touching.b.as_mut(), row, begun);
+            }
+        }
+        let effort = self.rules.effort;
+        let (problem, impulses, work) = self.touching.parts();
+        impulses.fill(zero);
+        let certificate = solve(&problem, effort, impulses, work)
+            .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
+        let result = Impact { certificate, energy: energy(&problem, impulses), limited: None, rounds: 1 };
+        self.touching.settles.as_mut().fill(false);
+        for i in 0..self.touching.count {
+            let (k, row) = (self.touching.contact(i), self.touching.touch(i).contact.row);
+            let pressed = get(self.touching.impulses.as_ref(), row) > zero;
+            // What the short time leaves does not open it.
+            set(self.touching.settles.as_mut(), k, pressed);
+        }
+        self.strike(system, t, &result);
+        self.stay(system, t, Some(result.energy));
+        Ok(result)
+    }
+}
