@@ -45,7 +45,7 @@ class ContactEvent(NamedTuple):
     row: int
     time: float
     contact: str
-    cause: Literal["lands", "opens", "slips", "stops"]
+    cause: Literal["lands", "opens", "slips", "stops", "jams"]
     mode: Literal["open", "closed", "sliding", "sticking"]
     approach: float
     energy: float

@@ -376,6 +376,9 @@ pub fn report(plan: &Plan, touched: &Touched, choice: RegimeChoice, out: &mut dy
             "impacts: residual at most {:.1e} of the impulses, {} limited so that none gains energy",
             contacts.residual, contacts.limited
         )?;
+        if contacts.jams > 0 {
+            writeln!(out, "jams: {}, where friction stopped or turned a contact that slides by an impulse", contacts.jams)?;
+        }
     }
     Ok(())
 }

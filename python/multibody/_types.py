@@ -49,9 +49,9 @@ class Crossing(NamedTuple):
 class ContactEvent(NamedTuple):
     """An event of a contact in a row: its time, s, and the name of the contact.
 
-    ``cause`` is ``"lands"``, ``"opens"``, ``"slips"`` or ``"stops"``, ``mode`` what the contact does then (``"open"``, ``"closed"``
-    without friction, ``"sliding"``, ``"sticking"``), ``approach`` the speed at which the bodies met, m/s, ``energy`` what an impact
-    has changed the kinetic energy by, J.
+    ``cause`` is ``"lands"``, ``"opens"``, ``"slips"``, ``"stops"`` or ``"jams"`` (friction stops or turns a contact that slides by
+    an impulse), ``mode`` what the contact does then (``"open"``, ``"closed"`` without friction, ``"sliding"``, ``"sticking"``),
+    ``approach`` the speed at which the bodies met, m/s, ``energy`` what an impact has changed the kinetic energy by, J.
     """
 
     row: int

@@ -2,7 +2,8 @@
 
 use mbd_codegen::model::Model;
 use mbd_codegen::plan::Plan;
-use mbd_runtime::contact::{Cause, ContactStatistics, Mode};
+use mbd_runtime::contact::{Cause, ContactStatistics, HybridError, Mode};
+use mbd_runtime::StepError;
 use mbd_testing::random::Rng;
 
 use super::scene::{model, Scene};
@@ -70,6 +71,34 @@ fn thrown(text: &str, seed: u64) -> Scene {
     let mut scene = Scene::new(model, &q, &v);
     scene.tolerance = 1e-8;
     scene
+}
+
+/// A hundred of them, or as many as `MBD_DROPS` says; the numbers of those that are not followed to their end within 20,000 steps,
+/// and of those that end with another error.
+#[test]
+#[ignore]
+fn many_thrown_quadrupeds_land() {
+    let count = std::env::var("MBD_DROPS").map_or(100, |count| count.parse().unwrap());
+    for (name, text, time) in [
+        ("falls", include_str!("../../../models/contacts/quadruped.toml"), 0.3),
+        ("stands", include_str!("../../../models/contacts/quadruped_hop.toml"), 0.5),
+    ] {
+        let (mut long, mut failed, mut jams) = (0, 0, 0);
+        for seed in 0..count {
+            let mut scene = thrown(text, seed);
+            scene.steps = 20_000;
+            match scene.try_run(time) {
+                Err(HybridError::Step(StepError::TooManySteps { .. })) => long += 1,
+                Err(error) => {
+                    failed += 1;
+                    println!("{name}, {seed}: {error}");
+                }
+                Ok(()) => jams += statistics(&scene).jams,
+            }
+        }
+        println!("{name}: of {count}, {long} take more steps, {failed} fail; {jams} jams");
+        assert!(failed * 50 <= count, "{name}: {failed} of {count}");
+    }
 }
 
 /// In these motions a foot jams, in most of them while it slides. (Where that changes, others of the first 24 will do as well.)
