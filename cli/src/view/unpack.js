@@ -27,7 +27,7 @@ function unlzma(input) {
   const lc = input[0] % 9, lp = Math.floor(input[0] / 9) % 5, pb = Math.floor(input[0] / 45);
   let out = new Uint8Array(1 << 22), n = 0, at = 18, range = -1 >>> 0;
   let code = ((input[14] << 24) | (input[15] << 16) | (input[16] << 8) | input[17]) >>> 0;
-  const probabilities = (count) => new Uint16Array(count).fill(1024);
+  const odds = (count) => new Uint16Array(count).fill(1024);
   const bit = (table, k) => {
     const p = table[k], bound = (range >>> 11) * p;
     let b = 0;
@@ -74,9 +74,9 @@ function unlzma(input) {
     }
     return value;
   };
-  const literal = probabilities(0x300 << (lc + lp)), isMatch = probabilities(192), isRep = probabilities(12), repG0 = probabilities(12), repG1 = probabilities(12), repG2 = probabilities(12), rep0Long = probabilities(192);
-  const slot = probabilities(256), special = probabilities(128), align = probabilities(16);
-  const lengths = () => ({ choice: probabilities(2), low: probabilities(16 << 3), mid: probabilities(16 << 3), high: probabilities(256) });
+  const literal = odds(0x300 << (lc + lp)), isMatch = odds(192), isRep = odds(12), repG0 = odds(12), repG1 = odds(12), repG2 = odds(12), rep0Long = odds(192);
+  const slot = odds(256), special = odds(128), align = odds(16);
+  const lengths = () => ({ choice: odds(2), low: odds(16 << 3), mid: odds(16 << 3), high: odds(256) });
   const matchLength = lengths(), repLength = lengths();
   const length = ({ choice, low, mid, high }, state) => {
     if (!bit(choice, 0)) return 2 + tree(low, state << 3, 3);

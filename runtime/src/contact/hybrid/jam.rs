@@ -38,7 +38,7 @@ where
     ) -> Result<(), HybridError> {
         match self.select(system, t) {
             Ok(()) => Ok(()),
-            Err(error) => self.jam(system, t, &RAISED, event, |_| true, error),
+            Err(error) => self.jam(system, t, &RAISED, event, None, error),
         }
     }
 
@@ -55,7 +55,7 @@ where
         let error = ContactError::Wedged { touch: event.contact, pivot: 0.0 };
         let error = HybridError::Contact { time: t.to_f64(), error };
         let [_, raised @ ..] = &RAISED;
-        self.jam(system, t, raised, Some(event), |_| true, error)?;
+        self.jam(system, t, raised, Some(event), None, error)?;
         self.begin_modes(system, t)
     }
 
@@ -96,11 +96,8 @@ where
             impact: None,
             rest: None,
         };
-        let finite = |hybrid: &Self| {
-            let forces = hybrid.touching.impulses.as_ref().iter().take(hybrid.touching.rows());
-            forces.fold(zero, |most, f| if f.abs() > most { f.abs() } else { most }) < Y::Scalar::constant(LEFT) * most
-        };
-        self.jam(system, t, &RAISED, Some(&mut event), finite, error.into())?;
+        let bound = Some(Y::Scalar::constant(LEFT) * most);
+        self.jam(system, t, &RAISED, Some(&mut event), bound, error.into())?;
         self.begin_modes(system, t)?;
         event.modes = [before, system.mode(contact)];
         self.statistics.events += 1;
@@ -108,7 +105,7 @@ where
         Ok(event)
     }
 
-    /// Jams, with friction raised by as little as leads to forces that are `enough`. `error` is the reason, which is given
+    /// Jams, with friction raised by as little as leads to forces below a `bound`, N, if there is one. `error` is the reason, which is given
     /// back where there are no such.
     fn jam(
         &mut self,
@@ -116,19 +113,22 @@ where
         t: Y::Scalar,
         raised: &[f64],
         mut event: Option<&mut ContactEvent<Y::Scalar>>,
-        enough: impl Fn(&Self) -> bool,
+        bound: Option<Y::Scalar>,
         error: HybridError,
     ) -> Result<(), HybridError> {
+        let zero = Y::Scalar::zero();
         self.statistics.impacts += 1;
         self.statistics.jams += 1;
         for raised in raised {
             let impact = self.press(system, t, *raised)?;
             if let Some(event) = event.as_deref_mut() {
-                let before = event.impact.map_or(Y::Scalar::zero(), |impact| impact.energy);
+                let before = event.impact.map_or(zero, |impact| impact.energy);
                 event.impact = Some(Impact { energy: before + impact.energy, ..impact });
             }
             self.forced = None;
-            if self.select(system, t).is_ok() && enough(self) {
+            let found = self.select(system, t).is_ok();
+            let forces = self.touching.impulses.as_ref().iter().take(self.touching.rows());
+            if found && bound.is_none_or(|bound| forces.fold(zero, larger) < bound) {
                 return Ok(());
             }
         }
@@ -160,13 +160,11 @@ where
         self.touching.assemble(system, t, &self.q, false);
         self.touching.free_accelerations(system, t, &self.q);
         let rows = self.touching.rows();
-        let larger = |most: Y::Scalar, x: Y::Scalar| if x.abs() > most { x.abs() } else { most };
-        let accelerations = self.touching.b.as_ref().iter().take(rows);
-        let most = accelerations.fold(zero, |most, a| larger(most, *a));
+        let most = self.touching.b.as_ref().iter().take(rows).fold(zero, larger);
         let mut fastest = zero;
         for i in 0..self.touching.count {
             let k = self.touching.contact(i);
-            fastest = larger(larger(fastest, system.speed(k)), system.gap_rate(k));
+            fastest = larger(larger(fastest, &system.speed(k)), &system.gap_rate(k));
         }
         let seed = Y::Scalar::constant(SEED[0]) * fastest + Y::Scalar::constant(SEED[1]);
         let time = if most > zero { seed / most } else { zero };
@@ -203,5 +201,14 @@ where
         self.strike(system, t, &result);
         self.stay(system, t, Some(result.energy));
         Ok(result)
+    }
+}
+
+/// The larger of a number and the size of another.
+fn larger<S: Real>(most: S, x: &S) -> S {
+    if x.abs() > most {
+        x.abs()
+    } else {
+        most
     }
 }
