@@ -105,8 +105,8 @@ where
         Ok(event)
     }
 
-    /// Jams, with friction raised by as little as leads to forces below a `bound`, N, if there is one. `error` is the reason, which is given
-    /// back where there are no such.
+    /// Jams, with friction raised by as little as leads to forces below a `bound`, N, if there is one. `error` is the reason,
+    /// which is given back where there are no such.
     fn jam(
         &mut self,
         system: &mut WithContacts<Y>,
