@@ -66,7 +66,12 @@ where
         error: StepError,
         observer: &mut impl ContactObserver<Y>,
     ) -> Result<ContactEvent<Y::Scalar>, HybridError> {
-        if !(system.rubs && matches!(error, StepError::StepTooSmall { .. })) {
+        // Implicit methods find no state beyond, explicit ones none without an error.
+        let ends = matches!(
+            error,
+            StepError::StepTooSmall { .. } | StepError::NoConvergence { .. } | StepError::NotFinite { .. }
+        );
+        if !(system.rubs && ends) {
             return Err(error.into());
         }
         let (t, zero) = (self.start.0, Y::Scalar::zero());

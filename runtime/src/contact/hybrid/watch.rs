@@ -193,10 +193,10 @@ where
         }
         self.mind_searched(system, false);
         self.go_on(system, others);
-        match self.creeps(system) {
-            Some(contact) => Ok(Some(Found { contact, cause: Cause::Stopped, theta: one })),
+        Ok(match self.creeps(system) {
+            Some(contact) => Some(Found { contact, cause: Cause::Stopped, theta: one }),
             None => self.overloaded(system),
-        }
+        })
     }
 
     /// The next step starts where the last one ends. `known`: all gaps were looked at there.
@@ -224,11 +224,11 @@ where
     /// The event at which the forces of redundant contacts stop to be possible, if they have in the last step. Their
     /// distribution is not unique; the one that the constraints give may leave the friction cones although another does
     /// not. So the forces are solved for wherever it does.
-    fn overloaded(&mut self, system: &mut WithContacts<Y>) -> Result<Option<Found<Y::Scalar>>, HybridError> {
+    fn overloaded(&mut self, system: &mut WithContacts<Y>) -> Option<Found<Y::Scalar>> {
         let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
-        let Some(contact) = self.doubtful(system).filter(|_| !system.shares()) else { return Ok(None) };
-        if core::mem::take(&mut self.unchanged) || self.holds_at(system, one)? {
-            return Ok(None);
+        let contact = self.doubtful(system).filter(|_| !system.shares())?;
+        if core::mem::take(&mut self.unchanged) || self.holds_at(system, one) {
+            return None;
         }
         let (t, h) = self.solver.last_step();
         let (mut a, mut b) = (zero, one);
@@ -238,13 +238,13 @@ where
             if !(middle > a && middle < b) {
                 break;
             }
-            if self.holds_at(system, middle)? {
+            if self.holds_at(system, middle) {
                 a = middle;
             } else {
                 b = middle;
             }
         }
-        Ok(Some(Found { contact, cause: Cause::Unloaded, theta: b }))
+        Some(Found { contact, cause: Cause::Unloaded, theta: b })
     }
 
     /// The first closed contact whose force at the end of the step is not possible.
@@ -259,14 +259,14 @@ where
     }
 
     /// Whether the modes are those that the forces at `θ` in the last step give.
-    fn holds_at(&mut self, system: &mut WithContacts<Y>, theta: Y::Scalar) -> Result<bool, HybridError> {
+    fn holds_at(&mut self, system: &mut WithContacts<Y>, theta: Y::Scalar) -> bool {
         let (t, h) = self.solver.last_step();
         self.solver.dense(system, theta, &mut self.q, &mut self.p);
         system.look(t + theta * h, &self.q, &self.p);
         self.touching.take_closed(system);
         // Where there are no forces, friction jams a contact: an event.
         let found = self.select(system, t + theta * h).is_ok();
-        Ok(found && self.touching.modes.as_ref() == system.modes())
+        found && self.touching.modes.as_ref() == system.modes()
     }
 
     /// Takes the end of a stretch for the start of the next one.
