@@ -12,7 +12,7 @@ use multibody::codegen::{Arithmetic, Options};
 use multibody::runtime::catalogue::BoxedMethod;
 use multibody::runtime::constrained::{Effort, Projection, WithPostStep};
 use multibody::runtime::contact::{
-    ContactEvent, ContactMotion, ContactObserver, ContactStatistics, HybridError, Mode, ModeTable, Regime,
+    Cause, ContactEvent, ContactMotion, ContactObserver, ContactStatistics, HybridError, Mode, ModeTable, Regime,
     RegimeChange, RegimeChoice, RegimeReason, RegimeStatistics, SteppingStatistics, Stretch, WithContacts,
 };
 use multibody::runtime::integrate::{AutoSwitch, Radau5, Statistics, Step};
@@ -335,7 +335,7 @@ pub fn report(plan: &Plan, touched: &Touched, choice: RegimeChoice, out: &mut dy
     }
     for event in events.iter().take(SHOWN) {
         let mut line = format!("  {:>12.9} s  {} {}", event.time, name(plan, event.contact), event.cause.verb());
-        if event.impact.is_some() {
+        if event.impact.is_some() && event.cause != Cause::Jammed {
             let _ = write!(line, " at {:.6} {}/s", event.approach, unit(plan, event.contact));
         }
         if let Some(rest) = event.rest {
@@ -377,7 +377,11 @@ pub fn report(plan: &Plan, touched: &Touched, choice: RegimeChoice, out: &mut dy
             contacts.residual, contacts.limited
         )?;
         if contacts.jams > 0 {
-            writeln!(out, "jams: {}, where friction stopped or turned a contact that slides by an impulse", contacts.jams)?;
+            writeln!(
+                out,
+                "jams: {}, where friction stopped or turned a contact that slides by an impulse",
+                contacts.jams
+            )?;
         }
     }
     Ok(())

@@ -29,6 +29,15 @@ fn the_table_of_events_has_the_bounces_of_a_ball() {
     assert_eq!(count, 6);
 }
 
+/// A walker that has fallen slides on the tip of a leg, ahead of which friction wedges it.
+#[test]
+fn a_jam_is_told() {
+    let folder = folder("contacts_jam");
+    let output = good(run_in(&folder, &["simulate", &shipped("simplest_walker"), "--time", "2.1"]));
+    assert!(out(&output).contains("heel_b jams, then "), "{}", out(&output));
+    assert!(out(&output).contains("\njams: 1, where friction stopped"), "{}", out(&output));
+}
+
 #[test]
 fn stops_have_the_units_of_their_joints() {
     let folder = folder("contacts_stop");
