@@ -2,6 +2,7 @@
 //!
 //! Callers check lengths once, where an error can be told; here, what is out of range is left out.
 
+use crate::system::Real;
 use crate::Scalar;
 
 /// What `f` gives for each index. Compilers take far less time for it than for `core::array::from_fn`, of which sweeps have
@@ -24,6 +25,12 @@ pub(crate) fn array<T: Copy, const N: usize>(mut f: impl FnMut(usize) -> T) -> [
 #[inline(always)]
 pub(crate) fn array<T: Copy, const N: usize>(f: impl FnMut(usize) -> T) -> [T; N] {
     core::array::from_fn(f)
+}
+
+/// The size of the largest entry; zero of none.
+#[inline(always)]
+pub(crate) fn largest<S: Real>(list: &[S]) -> S {
+    list.iter().fold(S::zero(), |most, x| if x.abs() > most { x.abs() } else { most })
 }
 
 /// The first `n` entries.

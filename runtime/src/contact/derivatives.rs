@@ -2,7 +2,7 @@
 
 use super::{Touching, WithContacts};
 use crate::integrate::Chart;
-use crate::lists::{copy, get, set};
+use crate::lists::{copy, get, largest, set};
 use crate::system::{Differentiable, Real, StateDerivatives, System};
 use crate::Scalar;
 
@@ -34,7 +34,7 @@ impl<Y: Touching + Differentiable> Differentiable for WithContacts<Y> {
         let (mut qd, mut moved_q, mut moved_p) = (q.clone(), q.clone(), p.clone());
         let (mut v, mut pd) = (p.clone(), p.clone());
         self.velocities_and_forces(t, (q, p), &mut qd, &mut out.v, &mut out.pd);
-        let largest = p.as_ref().iter().fold(zero, |most, p| if p.abs() > most { p.abs() } else { most });
+        let largest = largest(p.as_ref());
         let count = p.as_ref().len();
         for k in 0..2 * count {
             copy(moved_q.as_mut(), q.as_ref());

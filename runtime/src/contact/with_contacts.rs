@@ -9,7 +9,7 @@ use super::assembly::lines;
 use super::instant::Touches;
 use super::touching::add_row;
 use super::{Contact, Effort, Mode, Touching};
-use crate::lists::{copy, first, get, get_or, set};
+use crate::lists::{copy, first, get, get_or, largest, set};
 use crate::system::{system_within, Conjugate, Constrained, Energetic, LieJoint, Real, Row, System};
 use crate::Scalar;
 
@@ -417,7 +417,7 @@ impl<Y: Touching> WithContacts<Y> {
         let zero = Y::Scalar::zero();
         let c = instant.touch(i).contact;
         let f = first(instant.impulses.as_ref(), instant.rows());
-        let largest = f.iter().fold(zero, |most, x| if x.abs() > most { x.abs() } else { most });
+        let largest = largest(f);
         let [n, mut x, mut y] = [get(f, c.row), -get(f, c.row + 1), -get(f, c.row + 2)];
         if !(n > Y::Scalar::constant(UNSURE) * largest) {
             (x, y) = (instant.with_impulses(c.row + 1), instant.with_impulses(c.row + 2));

@@ -8,7 +8,7 @@ use mbd_testing::random::Rng;
 
 use super::scene::{model, Scene};
 
-/// A rod of 2 m and 1 kg whose lower end slides on the floor: the rod, the angle to the floor, and the friction.
+/// A rod of 2 m and 1 kg that may touch the floor with its lower end.
 fn rod(friction: f64) -> Model {
     model(&format!(
         r#"
@@ -38,7 +38,6 @@ fn a_rod_jams_at_once() {
     let angle = 1.1_f64;
     for (speed, jams) in [(1.0, 0), (-1.0, 1)] {
         let mut scene = sliding(2.0, angle, speed, 0.0);
-        scene.start();
         scene.run(0.0);
         assert_eq!(statistics(&scene).jams, jams, "{:?}", statistics(&scene));
         let rotation = 0.75 * speed.abs() * angle.sin();

@@ -12,7 +12,7 @@ use crate::contact::solver::energy;
 use crate::contact::{solve, ContactError, Impact, Touching, WithContacts};
 use crate::error::StepError;
 use crate::integrate::Stepper;
-use crate::lists::{copy, get, get_or, set};
+use crate::lists::{copy, first, get, get_or, largest, set};
 use crate::system::Real;
 use crate::Scalar;
 
@@ -52,7 +52,8 @@ where
         self.take_touching(system);
         self.fill_all(system);
         self.mind_near(system);
-        let error = ContactError::Wedged { touch: event.contact, pivot: 0.0 };
+        let touch = self.touching.order().iter().position(|k| *k == event.contact).unwrap_or_default();
+        let error = ContactError::Wedged { touch, pivot: 0.0 };
         let error = HybridError::Contact { time: t.to_f64(), error };
         let [_, raised @ ..] = &RAISED;
         self.jam(system, t, raised, Some(event), None, error)?;
@@ -132,23 +133,43 @@ where
             }
             self.forced = None;
             let found = self.select(system, t).is_ok();
-            let forces = self.touching.impulses.as_ref().iter().take(self.touching.rows());
-            if found && bound.is_none_or(|bound| forces.fold(zero, larger) < bound) {
+            let forces = first(self.touching.impulses.as_ref(), self.touching.rows());
+            if found && bound.is_none_or(|bound| largest(forces) < bound) {
                 return Ok(());
             }
         }
         Err(error)
     }
 
-    /// The impulses of a jam at the state that was looked at last, of the contacts in the problem and of those whose gaps are
-    /// zero there: those of an implicit time step that is as short as rounding errors let it be. Friction of contacts that
-    /// slide is `raised` by a part.
+    /// The impulses of a jam at the state that was looked at last, with friction of contacts that slide `raised` by a part.
     fn press(
         &mut self,
         system: &mut WithContacts<Y>,
         t: Y::Scalar,
         raised: f64,
     ) -> Result<Impact<Y::Scalar>, HybridError> {
+        self.pose_jam(system, t, raised);
+        let effort = self.rules.effort;
+        let (problem, impulses, work) = self.touching.parts();
+        impulses.fill(Y::Scalar::zero());
+        let certificate = solve(&problem, effort, impulses, work)
+            .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
+        let result = Impact { certificate, energy: energy(&problem, impulses), limited: None, rounds: 1 };
+        self.touching.settles.as_mut().fill(false);
+        for i in 0..self.touching.count {
+            let (k, row) = (self.touching.contact(i), self.touching.touch(i).contact.row);
+            let pressed = get(self.touching.impulses.as_ref(), row) > Y::Scalar::zero();
+            // What the short time leaves does not open it.
+            set(self.touching.settles.as_mut(), k, pressed);
+        }
+        self.strike(system, t, &result);
+        self.stay(system, t, Some(result.energy));
+        Ok(result)
+    }
+
+    /// Poses the problem of a jam, of the contacts in the problem and of those whose gaps are zero: an implicit time step that is
+    /// as short as rounding errors let it be.
+    fn pose_jam(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, raised: f64) {
         let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
         self.touching.begins.as_mut().fill(false);
         for i in 0..self.touching.count {
@@ -157,20 +178,18 @@ where
         }
         self.touching.count = 0;
         for k in 0..self.count(system) {
-            let near = system.gap(k).to_f64() <= self.rules.touching && !self.ignores(k);
-            if near || get_or(self.touching.begins.as_ref(), k, false) {
+            if self.touches(system, k) || get_or(self.touching.begins.as_ref(), k, false) {
                 self.touching.take(system, k);
             }
         }
         self.touching.assemble(system, t, &self.q, false);
         self.touching.free_accelerations(system, t, &self.q);
-        let rows = self.touching.rows();
-        let most = self.touching.b.as_ref().iter().take(rows).fold(zero, larger);
-        let mut fastest = zero;
-        for i in 0..self.touching.count {
-            let k = self.touching.contact(i);
-            fastest = larger(larger(fastest, &system.speed(k)), &system.gap_rate(k));
-        }
+        let most = largest(first(self.touching.b.as_ref(), self.touching.rows()));
+        let fastest = self
+            .touching
+            .order()
+            .iter()
+            .fold(zero, |fastest, &k| largest(&[fastest, system.speed(k), system.gap_rate(k)]));
         let seed = Y::Scalar::constant(SEED[0]) * fastest + Y::Scalar::constant(SEED[1]);
         let time = if most > zero { seed / most } else { zero };
         for i in 0..self.touching.count {
@@ -190,30 +209,5 @@ where
                 set(self.touching.b.as_mut(), row, begun);
             }
         }
-        let effort = self.rules.effort;
-        let (problem, impulses, work) = self.touching.parts();
-        impulses.fill(zero);
-        let certificate = solve(&problem, effort, impulses, work)
-            .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
-        let result = Impact { certificate, energy: energy(&problem, impulses), limited: None, rounds: 1 };
-        self.touching.settles.as_mut().fill(false);
-        for i in 0..self.touching.count {
-            let (k, row) = (self.touching.contact(i), self.touching.touch(i).contact.row);
-            let pressed = get(self.touching.impulses.as_ref(), row) > zero;
-            // What the short time leaves does not open it.
-            set(self.touching.settles.as_mut(), k, pressed);
-        }
-        self.strike(system, t, &result);
-        self.stay(system, t, Some(result.energy));
-        Ok(result)
-    }
-}
-
-/// The larger of a number and the size of another.
-fn larger<S: Real>(most: S, x: &S) -> S {
-    if x.abs() > most {
-        x.abs()
-    } else {
-        most
     }
 }

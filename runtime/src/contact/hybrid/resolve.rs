@@ -141,11 +141,15 @@ where
     pub(super) fn take_touching(&mut self, system: &WithContacts<Y>) {
         self.touching.count = 0;
         for k in 0..self.count(system) {
-            let near = system.gap(k).to_f64() <= self.rules.touching && !self.ignores(k);
-            if system.mode(k) != Mode::Open || near {
+            if system.mode(k) != Mode::Open || self.touches(system, k) {
                 self.touching.take(system, k);
             }
         }
+    }
+
+    /// Whether the gap of contact `k` is zero, and it is minded.
+    pub(super) fn touches(&self, system: &WithContacts<Y>, k: usize) -> bool {
+        system.gap(k).to_f64() <= self.rules.touching && !self.ignores(k)
     }
 
     /// Impulses, where bodies that touch approach each other.

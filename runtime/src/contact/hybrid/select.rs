@@ -4,7 +4,7 @@ use super::{Cause, Hybrid, HybridError};
 use crate::contact::with_contacts::CREEP;
 use crate::contact::{Mode, Touch, Touching, WithContacts};
 use crate::integrate::Stepper;
-use crate::lists::{copy, first, get, set};
+use crate::lists::{copy, first, get, largest, set};
 use crate::system::Real;
 use crate::Scalar;
 
@@ -69,9 +69,7 @@ where
         let zero = Y::Scalar::zero();
         let touching = &mut self.touching;
         let rows = touching.rows();
-        let size = |list: &[Y::Scalar]| {
-            first(list, rows).iter().fold(zero, |most, x| if x.abs() > most { x.abs() } else { most })
-        };
+        let size = |list: &[Y::Scalar]| largest(first(list, rows));
         let small = Y::Scalar::constant(SMALL);
         let (still, unloaded) = (small * size(touching.b.as_ref()), small * size(touching.impulses.as_ref()));
         for i in 0..touching.count {

@@ -1,7 +1,7 @@
 //! The residual of the laws of contact.
 
 use super::{Problem, Terms, Touch};
-use crate::lists::get;
+use crate::lists::{get, largest};
 use crate::system::Real;
 
 /// Length of a vector; at the origin, where it has no derivative, that of numbers with derivatives is zero.
@@ -80,13 +80,12 @@ pub(super) fn residual<S: Real>(
                 [normal, x - px, y - py]
             }
         };
-        let largest = |list: [S; 3]| list.iter().fold(zero, |most, x| if x.abs() > most { x.abs() } else { most });
-        let found = largest(off);
+        let found = largest(&off);
         if found > worst.1 || !found.is_finite() {
             worst = (index, found);
         }
         let start = mass * get(problem.b, row);
-        let own = largest([n, x, if start.abs() > y.abs() { start } else { y }]);
+        let own = largest(&[n, x, if start.abs() > y.abs() { start } else { y }]);
         if own > size {
             size = own;
         }

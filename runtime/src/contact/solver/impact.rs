@@ -6,7 +6,7 @@ use super::{
     Terms,
 };
 use crate::contact::RestitutionLaw;
-use crate::lists::{copy, get, part_mut, set, split};
+use crate::lists::{copy, get, largest, part_mut, set, split};
 use crate::system::Real;
 
 /// In which order the contacts of an impact act.
@@ -239,7 +239,7 @@ fn expand<S: Real, E>(
 /// Single contacts one after the other, the fastest first; gives the number of collisions.
 fn sequential<S: Real>(problem: &Problem<S>, effort: Effort, impulses: &mut [S]) -> Result<u32, ContactError> {
     let zero = S::zero();
-    let fastest = problem.b.iter().fold(zero, |most, v| if v.abs() > most { v.abs() } else { most });
+    let fastest = largest(problem.b);
     let slow = S::constant(match effort {
         Effort::ToTolerance { tolerance, .. } => tolerance,
         Effort::Sweeps(_) => 0.0,

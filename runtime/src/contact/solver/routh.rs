@@ -10,6 +10,7 @@ use super::local::{self, Block, Flow};
 use super::{ContactError, Touch};
 use crate::contact::{Contact, RestitutionLaw};
 use crate::integrate::{Direction, Dop853, Events, Outcome, Solver, Step, Tolerances, Watch};
+use crate::lists::largest;
 use crate::system::{LieJoint, Real, System};
 
 /// Part of the inverse inertia below which the direction of slip counts as constant.
@@ -45,7 +46,7 @@ pub(super) fn collide<S: Real>(block: &Block<S>, contact: &Contact<S>) -> Result
     if !contact.tangents || !(contact.friction > zero) {
         return Ok([-((one + e) * block.q[0] / block.w[0][0]), zero, zero]);
     }
-    let size = block.q.iter().fold(zero, |most, v| if v.abs() > most { v.abs() } else { most });
+    let size = largest(&block.q);
     let unit = block.w[0][0];
     let mut process = Process {
         w: block.w.map(|row| row.map(|w| w / unit)),
