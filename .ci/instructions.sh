@@ -69,9 +69,8 @@ while read -r model function limit; do
     many=$(collected "$model" "$function" $((calls + calls / 10)))
     count=$(((many - few) / calls))
     [ "$function" != free ] || free=$count
-    # Contacts that are far away may cost a twentieth of a motion; of one with rates as small as the leg's, a little more.
-    case $model in leg) most=107 ;; *) most=105 ;; esac
-    [ "$function" != far ] || [ $((100 * count)) -le $((most * free)) ] \
+    # Contacts that are far away may cost a twentieth of a motion.
+    [ "$function" != far ] || [ $((100 * count)) -le $((105 * free)) ] \
         || over+="$model: $count instructions with contacts that are far, $free without contacts"$'\n'
     printf '%-16s %-14s %12d %8d\n' "$model" "$function" "$count" "$limit"
     [ "$count" -le "$limit" ] || over+="$model $function: $count instructions, limit $limit"$'\n'

@@ -1,7 +1,7 @@
 //! `mbd view`: a page for browsers, one file without requests, in which the mechanism moves.
 //!
 //! The page has the readers, the generator and the integrators as WebAssembly, `page.wasm.lzma`, and its scripts, the
-//! JavaScript files of this folder, as `page.js.lzma`. `.ci/page.sh` builds both.
+//! JavaScript files of this folder, with its style as `page.js.lzma`. `.ci/page.sh` builds both.
 
 mod gltf;
 mod serve;
@@ -21,12 +21,11 @@ use super::{ink, source, Failure, Outcome};
 
 /// What runs in the page's worker, compressed.
 const WASM: &[u8] = include_bytes!("page.wasm.lzma");
-/// The JavaScript files, packed by `page/scripts.mjs` and compressed.
+/// The JavaScript files and the style, packed by `page/scripts.mjs` and compressed.
 const SCRIPTS: &[u8] = include_bytes!("page.js.lzma");
 /// What decompresses both in the page.
 const UNPACK: &str = include_str!("unpack.js");
 const TEMPLATE: &str = include_str!("page.html");
-const STYLE: &str = include_str!("page.css");
 
 /// A text without indents, empty lines and lines of comments.
 fn compact(text: &str) -> String {
@@ -150,7 +149,6 @@ fn page(given: &Given) -> String {
         TEMPLATE,
         &[
             ("TITLE", &title),
-            ("STYLE", &compact(STYLE)),
             ("GIVEN", &json),
             ("WASM", &wasm),
             ("SCRIPTS", &scripts),

@@ -33,7 +33,7 @@ fn one_small_file_without_requests() {
     assert_eq!(given["options"]["floating"], true);
     assert!(page.contains("<title>g1_29dof_rev_1_0 · mbd view</title>"));
     // Every place of the template is filled.
-    for place in ["@TITLE@", "@STYLE@", "@GIVEN@", "@WASM@", "@SCRIPT@"] {
+    for place in ["@TITLE@", "@GIVEN@", "@WASM@", "@SCRIPTS@", "@UNPACK@", "@INKS@"] {
         assert!(!page.contains(place), "{place}");
     }
 }

@@ -42,6 +42,8 @@ pub struct WithContacts<Y: Touching> {
     instant: Option<Touches<Y>>,
     /// Whether it has forces found with the present modes, from which the next ones are searched.
     near: bool,
+    /// Whether no such forces were found in this step, so that they are not searched again before the next one.
+    unsure: bool,
     /// Whether any contact slides with friction.
     pub(super) rubs: bool,
     /// Whether rows of closed contacts depend on one another.
@@ -96,6 +98,7 @@ impl<Y: Touching> WithContacts<Y> {
             begins: system.per_contact(false),
             instant: Some(Touches::new(&system)),
             near: false,
+            unsure: false,
             rubs: false,
             redundant: false,
             at: Contacts {
@@ -199,7 +202,7 @@ impl<Y: Touching> WithContacts<Y> {
     }
 
     fn modes_are_set(&mut self) {
-        self.near = false;
+        (self.near, self.unsure) = (false, false);
         for (pressed, mode) in self.pressed.as_mut().iter_mut().zip(self.modes.as_ref()) {
             *pressed = *mode != Mode::Open;
         }
@@ -377,6 +380,7 @@ impl<Y: Touching> WithContacts<Y> {
         if !self.rubs {
             return;
         }
+        self.unsure = false;
         self.look_at_closed(t, q, p);
         for k in 0..self.modes.as_ref().len() {
             let begins = self.begins(k) && !(self.speed(k).to_f64() > CREEP);
@@ -389,7 +393,8 @@ impl<Y: Touching> WithContacts<Y> {
     }
 
     /// Directions of slip that begins, after [`WithContacts::look`]: with forces that satisfy Coulomb's law at the level of
-    /// accelerations, friction against the acceleration of slip. Where no such forces are found, the directions stay.
+    /// accelerations, friction against the acceleration of slip. Where no such forces are found, the directions stay until the
+    /// next step begins, because to find none takes much longer than to find some.
     fn begin(&mut self, t: Y::Scalar, q: &Y::Coordinates) {
         let Some(mut instant) = self.instant.take() else { return };
         instant.take_closed(self);
@@ -400,6 +405,7 @@ impl<Y: Touching> WithContacts<Y> {
             }
         }
         self.near = instant.find_forces(self, t, q, Effort::default(), self.near).is_ok();
+        self.unsure = !self.near;
         if self.near {
             for i in 0..instant.count {
                 let k = instant.contact(i);
@@ -448,7 +454,7 @@ impl<Y: Touching> WithContacts<Y> {
     /// on the joints. With `all`, those of sticking contacts include the effect of friction elsewhere.
     pub(super) fn loads(&mut self, t: Y::Scalar, q: &Y::Coordinates, all: bool) {
         let zero = Y::Scalar::zero();
-        if self.begins.as_ref().contains(&true) {
+        if self.begins.as_ref().contains(&true) && !self.unsure {
             self.begin(t, q);
         }
         self.friction.as_mut().fill(zero);

@@ -213,8 +213,13 @@ where
     }
 
     /// State at a displacement. Where sums are compensated, what was carried over is part of it.
-    #[inline]
     pub fn state(&self, system: &Y, point: &Point<Y>, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
+        self.stage_state(system, point, q, p);
+    }
+
+    /// [`Chart::state`] for the stages of a step, whose loops know the system's joints where this is inlined.
+    #[inline(always)]
+    pub(super) fn stage_state(&self, system: &Y, point: &Point<Y>, q: &mut Y::Coordinates, p: &mut Y::Momenta) {
         let (base, x) = (self.q.as_ref(), point.x.as_ref());
         let (cx, cp) = self.carry.as_ref().map_or((None, None), |c| (Some(c.x.as_ref()), Some(c.p.as_ref())));
         let q = q.as_mut();

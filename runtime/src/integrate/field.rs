@@ -117,7 +117,7 @@ where
             self.chart.stage(h, (weights, k), &mut self.q, &mut self.p);
         } else {
             stage.combine(h, weights, k);
-            self.chart.state(system, stage, &mut self.q, &mut self.p);
+            self.chart.stage_state(system, stage, &mut self.q, &mut self.p);
         }
         self.evaluate(system, t, stage, out);
     }

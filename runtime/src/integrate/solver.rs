@@ -292,7 +292,8 @@ where
 
     /// Bounds of how far each coordinate has come from where the last step began, at any time within it: twice what its mean
     /// rate gives in the step, and twice what its rates at the start and end give, where these are asked for. With them the
-    /// absolute values of the coordinates where the step began, if `sizes` are asked for; zero for rotations.
+    /// absolute values of the coordinates where the step began, zero for rotations: those of now if `sizes` are asked for, of the
+    /// last call that did otherwise.
     ///
     /// These rates are what the method needs anyway, but for methods that do not start the next step with the rate at the
     /// end of this one.

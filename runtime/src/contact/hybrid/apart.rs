@@ -63,9 +63,11 @@ where
             }
             self.settle_travel(system);
         }
+        // Sizes of coordinates are known from `settle_travel`, or after the first pass.
+        let mut sizes = self.slides && near;
         // Where displacements alone tell that gaps have to be looked at, rates at the end are not asked for.
         let apart = [[true, false], [true, true]].into_iter().skip(usize::from(!near)).all(|rates| {
-            let [moved, size] = self.solver.travel(system, rates, self.slides);
+            let [moved, size] = self.solver.travel(system, rates, core::mem::take(&mut sizes));
             travels(system.system().reaches(), moved.as_ref(), size.as_ref(), self.travel.as_mut());
             self.has_reserves(system, true)
         });
@@ -101,10 +103,11 @@ where
     }
 
     /// After a step in which no contact can have closed: how far the joints may move in all, that step included, before the
-    /// reserves are compared again. These last for some steps like this one, in which joints that rest begin to move.
+    /// reserves are compared again. These last for some steps like this one, in which joints that rest begin to move. Sizes of
+    /// coordinates have been asked for.
     fn allow_more(&mut self, system: &mut WithContacts<Y>) {
         let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
-        let [moved, size] = self.solver.travel(system, [true, true], self.slides);
+        let [moved, size] = self.solver.travel(system, [true, true], false);
         copy(self.gone.as_mut(), moved.as_ref());
         let most = moved.as_ref().iter().fold(zero, |most, x| if *x > most { *x } else { most });
         for (allowed, moved) in self.allowed.as_mut().iter_mut().zip(self.gone.as_ref()) {
