@@ -133,6 +133,11 @@ pub trait System {
     ) -> bool {
         false
     }
+    /// Rounding error of the rates of momenta that were computed last, N (N m), beyond that of their size: where forces come
+    /// from a division by a difference that is nearly zero. No step is made shorter for what it adds to an error.
+    fn rounding(&self) -> f64 {
+        0.0
+    }
     /// Name of a part, for messages; `None` where it is not known.
     fn part_name(&self, _part: Part) -> Option<&str> {
         None

@@ -10,7 +10,7 @@ use crate::Scalar;
 /// The next step as a fraction of the step that the error would allow.
 const SAFETY: f64 = 0.9;
 /// Rounding error of a component in a step, in epsilons of the largest one's size, below which a method's share of the
-/// tolerance does not take the allowed error.
+/// tolerance does not take the allowed error. The same number of errors of [`System::rounding`] is always allowed.
 const ROUNDING: f64 = 4.0;
 /// Smallest step, s.
 const LEAST: f64 = 1e-15;
@@ -426,10 +426,15 @@ where
                 rotations.fill(part(tolerances.rotations, 1.0));
             }
         }
+        // What rounding adds in a step is no less in many short ones.
+        let least = h * Y::Scalar::constant(ROUNDING * system.rounding());
         let full = tolerances.control == Control::Full;
         for (scale, size) in self.scale.p.as_mut().iter_mut().zip(self.size.p.as_ref()) {
             let size = size.to_f64().max(1e-3 * most_p);
             *scale = if full { allowed(tolerances.momenta, size, most_p) } else { Y::Scalar::zero() };
+            if full && *scale < least {
+                *scale = least;
+            }
         }
     }
 

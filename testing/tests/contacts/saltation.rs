@@ -17,6 +17,7 @@ use mbd_runtime::{Conjugate, Constrained, Dual, Real, Scalar};
 use nalgebra::{Matrix3, Vector3};
 
 use super::fields::{field, hills};
+use super::jams::rod;
 use super::known::{ball, block};
 use super::scene::{model, Events};
 
@@ -393,6 +394,31 @@ fn a_slip_that_turns_in_an_impact_is_refused() {
     let error = run.to(0.4).unwrap_err();
     let SaltationError::Motion(HybridError::Contact { error, .. }) = error else { panic!("{error}") };
     assert_eq!(error, ContactError::NoDerivative);
+}
+
+/// A rod whose end slides along the floor, and which turns: its angular velocity.
+struct SlidingRod;
+
+impl Family for SlidingRod {
+    fn model(&self) -> Model {
+        rod(2.0)
+    }
+
+    fn start<S: Real>(&self, x: &[S], _: &mut ContactInterpreter<S>) -> (Vec<S>, Vec<S>) {
+        let [angle, speed] = [0.47_f64, -5.0].map(|x| [x.sin(), x.cos(), x].map(S::constant));
+        let ([sine, cosine, angle], speed) = (angle, speed[2]);
+        (vec![S::zero(), sine, angle], vec![speed * cosine, x[0] - speed * sine, x[0]])
+    }
+}
+
+/// Forces grow without bound before a jam, and derivatives even faster: these end there, or shortly before.
+#[test]
+fn a_jam_has_no_derivative() {
+    let mut run = Run::new(&SlidingRod, &[2.7], true);
+    run.to(0.06).unwrap();
+    let error = run.to(0.07).unwrap_err();
+    let (SaltationError::Jammed { time, .. } | SaltationError::Stiff { time, .. }) = error else { panic!("{error}") };
+    assert!(time > 0.063 && time < 0.0631, "{time}");
 }
 
 #[test]

@@ -10,6 +10,8 @@ use crate::Scalar;
 
 /// Part of the largest acceleration, or force, that counts as zero.
 const SMALL: f64 = 1e-9;
+/// Force that counts as zero where it has just gone to zero, as a part of the largest momentum, 1/s.
+const NOTHING: f64 = 1e-6;
 /// Contacts stop together whose speeds of slip are below this many times the speed at which one stops.
 const TOGETHER: f64 = 10.0;
 
@@ -72,14 +74,19 @@ where
         let size = |list: &[Y::Scalar]| largest(first(list, rows));
         let small = Y::Scalar::constant(SMALL);
         let (still, unloaded) = (small * size(touching.b.as_ref()), small * size(touching.impulses.as_ref()));
+        let nothing = Y::Scalar::constant(NOTHING) * largest(self.p.as_ref());
         for i in 0..touching.count {
             let k = touching.contact(i);
             let Touch { contact: c, slip } = touching.touch(i);
             let cause = self.forced.filter(|(contact, ..)| *contact == k).map(|(_, cause, _)| cause);
-            // Where the force has just gone to zero, the acceleration starts from zero too.
-            let released = cause == Some(Cause::Unloaded);
-            if get(touching.impulses.as_ref(), c.row) <= unloaded && (released || touching.with_impulses(c.row) > still)
-            {
+            let force = get(touching.impulses.as_ref(), c.row);
+            let opens = match cause {
+                // The force has just gone to zero, and the acceleration starts from zero too. There may be no other force to
+                // compare it with.
+                Some(Cause::Unloaded) => force <= unloaded || force <= nothing,
+                _ => force <= unloaded && touching.with_impulses(c.row) > still,
+            };
+            if opens {
                 continue;
             }
             set(touching.modes.as_mut(), k, Mode::Slide);

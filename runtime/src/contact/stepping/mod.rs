@@ -21,12 +21,14 @@
 //! The method is of order 1 at impacts and where slip ends, of order 2 in between. Impulses never add energy: their work is
 //! that of an impact with velocities that approach no slower. What friction holds does not move.
 
+mod impulses;
+mod statistics;
+
+pub use impulses::{ByRules, FixedSweeps, StepImpulses};
+pub use statistics::SteppingStatistics;
+
 use super::instant::Touches;
-use super::solver::{impact_by_sweeps, impact_near};
-use super::{
-    impact, ContactError, ContactRules, Effort, HybridError, Impact, ImpactOptions, Problem, Stretch, Touching,
-    WithContacts,
-};
+use super::{ContactError, ContactRules, HybridError, Stretch, Touching, WithContacts};
 use crate::constrained::PostStep;
 use crate::error::StepError;
 use crate::integrate::{Chart, Point};
@@ -34,133 +36,14 @@ use crate::lists::{copy, first, first_mut, get, get_or, part, part_mut, set};
 use crate::system::Real;
 use crate::Scalar;
 use core::marker::PhantomData;
+use impulses::briefly;
 
-/// Relative residual of impulses that is enough where that of the rules is not reached: steps err by more.
-const RESIDUAL: f64 = 1e-5;
-/// Rounds of sweeps and Newton steps in which the residual of the rules is to be reached.
-const ROUNDS: u32 = 4;
 /// Overlap in the middle of a step that stays, m (rad for stops of rotations), and as a part of what the fastest gap changes by
 /// in the step: what moves fast errs by more.
 const OVERLAP: [f64; 2] = [1e-6, 0.01];
 
 /// Parts into which a step is divided at most.
 const PARTS: u32 = 16;
-
-/// What happened in a motion by time steps.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[non_exhaustive]
-pub struct SteppingStatistics<S = f64> {
-    /// Steps.
-    pub steps: u64,
-    /// Steps that were divided, because impulses did not converge.
-    pub divided: u64,
-    /// Steps and parts of steps with impulses.
-    pub touched: u64,
-    /// Steps and parts in which other contacts had impulses than in those before.
-    pub changes: u64,
-    /// Steps and parts whose restitution was reduced, so that no energy was gained.
-    pub limited: u64,
-    /// Largest number of contacts with an impulse in a step.
-    pub most: u32,
-    /// Kinetic energy that impulses have taken, J. Where forces press contacts together, this includes the work of these.
-    pub lost: S,
-    /// Largest relative residual of the impulses of a step.
-    pub residual: S,
-    /// Largest overlap at the middle of a step, m (rad for stops of rotations).
-    pub overlap: S,
-}
-
-impl<S: Real> SteppingStatistics<S> {
-    fn new() -> Self {
-        let zero = S::zero();
-        let [steps, divided, touched, changes, limited] = [0; 5];
-        SteppingStatistics {
-            steps,
-            divided,
-            touched,
-            changes,
-            limited,
-            most: 0,
-            lost: zero,
-            residual: zero,
-            overlap: zero,
-        }
-    }
-}
-
-/// How the impulses of a time step are found.
-pub trait StepImpulses {
-    /// Whether overlaps are taken away, for which impulses are found a second time in a step.
-    const LIFTS: bool;
-    /// Whether steps are divided whose impulses are not found.
-    const DIVIDES: bool;
-
-    /// The impulses of a problem, as [`impact`]; `impulses` has those of the last step.
-    ///
-    /// # Errors
-    /// [`ContactError`].
-    fn find<S: Real>(
-        rules: &ContactRules,
-        problem: &Problem<S>,
-        impulses: &mut [S],
-        work: &mut [S],
-    ) -> Result<Impact<S>, ContactError>;
-}
-
-/// By the rules: [`impact`]. Impulses that do not reach the residual of the rules are accepted at one of 1e-5.
-#[derive(Clone, Copy, Debug)]
-pub struct ByRules;
-
-impl StepImpulses for ByRules {
-    const LIFTS: bool = true;
-    const DIVIDES: bool = true;
-
-    fn find<S: Real>(
-        rules: &ContactRules,
-        problem: &Problem<S>,
-        impulses: &mut [S],
-        work: &mut [S],
-    ) -> Result<Impact<S>, ContactError> {
-        let order = rules.order;
-        let result = impact_near(problem, &ImpactOptions { effort: briefly(rules.effort), order }, impulses, work);
-        match (result, rules.effort) {
-            (Err(ContactError::NoConvergence { .. }), Effort::ToTolerance { tolerance, rounds }) => {
-                let effort = Effort::ToTolerance { tolerance: tolerance.max(RESIDUAL), rounds };
-                impact(problem, &ImpactOptions { effort, order }, impulses, work)
-            }
-            _ => result,
-        }
-    }
-}
-
-/// The same tolerance with few rounds: what is not found in these is hardly ever found in more.
-fn briefly(effort: Effort) -> Effort {
-    match effort {
-        Effort::ToTolerance { tolerance, rounds } => Effort::ToTolerance { tolerance, rounds: rounds.min(ROUNDS) },
-        Effort::Sweeps(_) => effort,
-    }
-}
-
-/// By exactly `N` sweeps over the contacts, all of which act at once, whatever the residual is and the rules say: for
-/// processors with a fixed time budget, so that overlaps stay. Nothing is allocated, and numbers stay in the precision of
-/// the system. A single
-/// contact with restitution has the impulses of several: of compression, then of expansion.
-#[derive(Clone, Copy, Debug)]
-pub struct FixedSweeps<const N: u32>;
-
-impl<const N: u32> StepImpulses for FixedSweeps<N> {
-    const LIFTS: bool = false;
-    const DIVIDES: bool = false;
-
-    fn find<S: Real>(
-        _: &ContactRules,
-        problem: &Problem<S>,
-        impulses: &mut [S],
-        work: &mut [S],
-    ) -> Result<Impact<S>, ContactError> {
-        impact_by_sweeps(problem, N, impulses, work)
-    }
-}
 
 /// A motion by time steps. The state is the caller's.
 ///
