@@ -16,11 +16,26 @@ use crate::lists::{copy, first, get, get_or, largest, set};
 use crate::system::Real;
 use crate::Scalar;
 
-/// Largest speed that the short time of a jam leads to by itself: a part of the speed that there is, and m/s.
-const SEED: [f64; 2] = [1e-9, 1e-12];
-/// Parts by which coefficients of friction are raised, one after the other, until a contact jams: where its force has only
-/// begun to grow without bound, friction would jam it a little later.
-const RAISED: [f64; 5] = [0.0, 1e-6, 1e-5, 1e-4, 1e-3];
+/// What is tried one after the other until a contact jams: a part by which coefficients of friction are raised, because where a
+/// force has only begun to grow without bound, friction would jam it a little later; and the part of the largest speed that
+/// the short time of the jam leads to by itself, the time being longer where the force only takes slip away in some time.
+const TRIES: [[f64; 2]; 9] = [
+    [0.0, 1e-9],
+    [1e-6, 1e-9],
+    [1e-5, 1e-9],
+    [1e-4, 1e-9],
+    [1e-3, 1e-9],
+    [0.0, 1e-6],
+    [0.0, 1e-5],
+    [0.0, 1e-4],
+    [0.0, 1e-3],
+];
+/// Number of those that are as short as rounding errors let them be.
+const SHORT: usize = 5;
+/// Least speed that the short time of a jam leads to, m/s.
+const LEAST: f64 = 1e-12;
+/// After every so many events at one instant, one that changes nothing is taken for a jam.
+const STUCK: u32 = 10;
 /// Part of the largest force that is left after a jam, at most, where steps have shrunk before it.
 const LEFT: f64 = 0.1;
 
@@ -38,7 +53,7 @@ where
     ) -> Result<(), HybridError> {
         match self.select(system, t) {
             Ok(()) => Ok(()),
-            Err(error) => self.jam(system, t, &RAISED, event, None, error),
+            Err(error) => self.jam(system, t, &TRIES, event, None, error),
         }
     }
 
@@ -55,8 +70,8 @@ where
         let touch = self.touching.order().iter().position(|k| *k == event.contact).unwrap_or_default();
         let error = ContactError::Wedged { touch, pivot: 0.0 };
         let error = HybridError::Contact { time: t.to_f64(), error };
-        let [_, raised @ ..] = &RAISED;
-        self.jam(system, t, raised, Some(event), None, error)?;
+        let [_, tries @ ..] = &TRIES;
+        self.jam(system, t, tries, Some(event), None, error)?;
         self.begin_modes(system, t)
     }
 
@@ -72,13 +87,48 @@ where
             error,
             StepError::StepTooSmall { .. } | StepError::NoConvergence { .. } | StepError::NotFinite { .. }
         );
-        if !(system.rubs && ends) {
+        if !ends {
             return Err(error.into());
         }
-        let (t, zero) = (self.start.0, Y::Scalar::zero());
-        self.crowd(t)?;
+        self.crowd(self.start.0)?;
         copy(self.q.as_mut(), self.start.1.as_ref());
         copy(self.p.as_mut(), self.start.2.as_ref());
+        let left = Some(Y::Scalar::constant(LEFT));
+        self.jam_sliding(system, self.start.0, &TRIES, left, error.into(), observer)
+    }
+
+    /// Jams after an event at which nothing changes, where many of them follow one another, if a contact slides there: a normal
+    /// force that goes through infinity has other signs on both sides, and no modes go on from there. A longer time each time.
+    pub(super) fn jam_if_stuck(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        observer: &mut impl ContactObserver<Y>,
+    ) -> Result<Option<ContactEvent<Y::Scalar>>, HybridError> {
+        let (t, events) = self.crowded;
+        let round = (events / STUCK) as usize;
+        if !(round > 0 && events % STUCK == 0 && system.rubs) {
+            return Ok(None);
+        }
+        let error = HybridError::TooManyEvents { time: t.to_f64(), events };
+        let how = TRIES[SHORT..].get(round - 1).ok_or(error)?;
+        self.jam_sliding(system, t, core::slice::from_ref(how), None, error, observer).map(Some)
+    }
+
+    /// Jams at the state in `self.q` and `self.p`, if a contact slides there; the one with the largest force is what is told, of
+    /// which a part may be `left`, if one is given.
+    fn jam_sliding(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        tries: &[[f64; 2]],
+        left: Option<Y::Scalar>,
+        error: HybridError,
+        observer: &mut impl ContactObserver<Y>,
+    ) -> Result<ContactEvent<Y::Scalar>, HybridError> {
+        if !system.rubs {
+            return Err(error);
+        }
+        let zero = Y::Scalar::zero();
         system.look_at_all(t, &self.q, &self.p);
         self.free_momenta(system);
         system.loads(t, &self.q, true);
@@ -102,8 +152,8 @@ where
             impact: None,
             rest: None,
         };
-        let bound = Some(Y::Scalar::constant(LEFT) * most);
-        self.jam(system, t, &RAISED, Some(&mut event), bound, error.into())?;
+        let bound = left.map(|left| left * most);
+        self.jam(system, t, tries, Some(&mut event), bound, error)?;
         self.begin_modes(system, t)?;
         event.modes = [before, system.mode(contact)];
         self.statistics.events += 1;
@@ -111,13 +161,13 @@ where
         Ok(event)
     }
 
-    /// Jams, with friction raised by as little as leads to forces below a `bound`, N, if there is one. `error` is the reason,
-    /// which is given back where there are no such.
+    /// Jams, by the first of some tries that leads to forces below a `bound`, N, if there is one. `error` is the reason, which is
+    /// given back where there are no such.
     fn jam(
         &mut self,
         system: &mut WithContacts<Y>,
         t: Y::Scalar,
-        raised: &[f64],
+        tries: &[[f64; 2]],
         mut event: Option<&mut ContactEvent<Y::Scalar>>,
         bound: Option<Y::Scalar>,
         error: HybridError,
@@ -125,8 +175,8 @@ where
         let zero = Y::Scalar::zero();
         self.statistics.impacts += 1;
         self.statistics.jams += 1;
-        for raised in raised {
-            let impact = self.press(system, t, *raised)?;
+        for how in tries {
+            let impact = self.press(system, t, *how)?;
             if let Some(event) = event.as_deref_mut() {
                 let before = event.impact.map_or(zero, |impact| impact.energy);
                 event.impact = Some(Impact { energy: before + impact.energy, ..impact });
@@ -141,14 +191,14 @@ where
         Err(error)
     }
 
-    /// The impulses of a jam at the state that was looked at last, with friction of contacts that slide `raised` by a part.
+    /// The impulses of a jam at the state that was looked at last, by one of the tries.
     fn press(
         &mut self,
         system: &mut WithContacts<Y>,
         t: Y::Scalar,
-        raised: f64,
+        how: [f64; 2],
     ) -> Result<Impact<Y::Scalar>, HybridError> {
-        self.pose_jam(system, t, raised);
+        self.pose_jam(system, t, how);
         let effort = self.rules.effort;
         let (problem, impulses, work) = self.touching.parts();
         impulses.fill(Y::Scalar::zero());
@@ -167,9 +217,9 @@ where
         Ok(result)
     }
 
-    /// Poses the problem of a jam, of the contacts in the problem and of those whose gaps are zero: an implicit time step that is
-    /// as short as rounding errors let it be.
-    fn pose_jam(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, raised: f64) {
+    /// Poses the problem of a jam, of the contacts in the problem and of those whose gaps are zero: an implicit time step, as
+    /// short as rounding errors let it be at first.
+    fn pose_jam(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, [raised, part]: [f64; 2]) {
         let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
         self.touching.begins.as_mut().fill(false);
         for i in 0..self.touching.count {
@@ -190,7 +240,7 @@ where
             .order()
             .iter()
             .fold(zero, |fastest, &k| largest(&[fastest, system.speed(k), system.gap_rate(k)]));
-        let seed = Y::Scalar::constant(SEED[0]) * fastest + Y::Scalar::constant(SEED[1]);
+        let seed = Y::Scalar::constant(part) * fastest + Y::Scalar::constant(LEAST);
         let time = if most > zero { seed / most } else { zero };
         for i in 0..self.touching.count {
             let k = self.touching.contact(i);

@@ -354,11 +354,11 @@ where
             return Ok(None);
         };
         let t = self.go_to(system, &found)?;
-        let event = self.resolve(system, t, &found)?;
-        if let Some(event) = &event {
-            observer.event(system, event);
-        }
-        Ok(event)
+        let Some(event) = self.resolve(system, t, &found)? else {
+            return self.jam_if_stuck(system, observer);
+        };
+        observer.event(system, &event);
+        Ok(Some(event))
     }
 
     /// Notes the state where the last step began, if [`Hybrid::advance`] has not: a step that is not searched needs none.

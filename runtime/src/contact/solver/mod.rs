@@ -70,6 +70,13 @@ impl Default for Effort {
     }
 }
 
+impl Effort {
+    /// A single round to the default tolerance, without random starts.
+    pub(super) const fn brief() -> Self {
+        Effort::ToTolerance { tolerance: 1e-11, rounds: 1 }
+    }
+}
+
 /// How well impulses satisfy the laws of contact, and the work that it took.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]

@@ -48,7 +48,7 @@ pub(super) fn iterate<S: Real>(
     let worst = progress.worst;
     let plain = Terms { problem, least, alpha: zero, anchor: &[] };
     // Friction may wedge a contact at the impulses of a sweep, and not at a solution.
-    if found == Ok(true) || rounds > 0 && elsewhere(&plain, tolerance, impulses, &mut progress, work) {
+    if found == Ok(true) || rounds > 1 && elsewhere(&plain, tolerance, impulses, &mut progress, work) {
         let Progress { worst, sweeps, newton } = progress;
         return Ok(Certificate { residual: worst.1, sweeps, newton });
     }

@@ -78,8 +78,8 @@ impl<Y: Touching> WithContacts<Y> {
     }
 
     /// Directions of slip that begins, after [`WithContacts::look`]: with forces that satisfy Coulomb's law at the level of
-    /// accelerations, friction against the acceleration of slip. Where no such forces are found, the directions stay until the
-    /// next step begins, because to find none takes much longer than to find some.
+    /// accelerations, friction against the acceleration of slip. Where no such forces are found, the directions stay, and the
+    /// next searches in the same step are brief ones.
     fn begin(&mut self, t: Y::Scalar, q: &Y::Coordinates) {
         let Some(mut instant) = self.instant.take() else { return };
         instant.take_closed(self);
@@ -89,8 +89,9 @@ impl<Y: Touching> WithContacts<Y> {
                 instant.set_slip(i, Some(self.direction(k)));
             }
         }
-        self.near = instant.find_forces(self, t, q, Effort::default(), self.near).is_ok();
-        self.unsure = !self.near;
+        let effort = if self.unsure { Effort::brief() } else { Effort::default() };
+        self.near = instant.find_forces(self, t, q, effort, self.near).is_ok();
+        self.unsure |= !self.near;
         if self.near {
             for i in 0..instant.count {
                 let k = instant.contact(i);
@@ -139,7 +140,7 @@ impl<Y: Touching> WithContacts<Y> {
     /// on the joints. With `all`, those of sticking contacts include the effect of friction elsewhere.
     pub(in crate::contact) fn loads(&mut self, t: Y::Scalar, q: &Y::Coordinates, all: bool) {
         let zero = Y::Scalar::zero();
-        if self.begins.as_ref().contains(&true) && !self.unsure {
+        if self.begins.as_ref().contains(&true) {
             self.begin(t, q);
         }
         self.friction.as_mut().fill(zero);

@@ -32,7 +32,7 @@ pub struct WithContacts<Y: Touching> {
     instant: Option<Touches<Y>>,
     /// Whether it has forces found with the present modes, from which the next ones are searched.
     near: bool,
-    /// Whether no such forces were found in this step, so that they are not searched again before the next one.
+    /// Whether no such forces were found once in this step.
     unsure: bool,
     /// Whether any contact slides with friction.
     pub(super) rubs: bool,
