@@ -3,7 +3,7 @@
 use mbd_codegen::model::Model;
 use mbd_codegen::plan::Plan;
 use mbd_runtime::contact::{Cause, ContactStatistics, HybridError, Mode};
-use mbd_runtime::StepError;
+use mbd_runtime::{Real, StepError};
 use mbd_testing::random::Rng;
 
 use super::scene::{model, Scene};
@@ -20,11 +20,18 @@ contact = [{{ name = "end", between = ["floor", "end"], friction = {friction} }}
     ))
 }
 
-/// The rod at an angle, whose end slides along the floor, and which turns.
-fn sliding(friction: f64, angle: f64, speed: f64, turning: f64) -> Scene {
+/// Coordinates and velocities of the rod at an angle, whose end slides along the floor, and which turns.
+pub fn sliding_state<S: Real>(angle: f64, speed: f64, turning: S) -> (Vec<S>, Vec<S>) {
+    let (sine, cosine) = angle.sin_cos();
     // Velocities of the centre in the rod's axes: that of the end is along the floor.
-    let v = [speed * angle.cos(), -speed * angle.sin() + turning, turning];
-    Scene::new(rod(friction), &[0.0, angle.sin(), angle], &v)
+    let v = vec![S::constant(speed * cosine), S::constant(-speed * sine) + turning, turning];
+    (vec![S::zero(), S::constant(sine), S::constant(angle)], v)
+}
+
+/// The rod in such a state.
+fn sliding(friction: f64, angle: f64, speed: f64, turning: f64) -> Scene {
+    let (q, v) = sliding_state(angle, speed, turning);
+    Scene::new(rod(friction), &q, &v)
 }
 
 fn statistics(scene: &Scene) -> ContactStatistics {
@@ -65,15 +72,17 @@ fn rods_jam_while_they_slide() {
         scene.steps = 300;
         scene.start();
         let before = scene.energy();
-        while scene.events.0.is_empty() {
-            scene.advance(0.3);
+        for _ in 0..200 {
+            if scene.events.0.is_empty() {
+                scene.advance(0.3);
+            }
         }
-        assert_eq!(scene.events.0[0].cause, cause);
+        assert_eq!(scene.events.0.first().map(|event| event.cause), Some(cause));
         let (sine, cosine) = scene.q[2].sin_cos();
         let pivot = 1.0 + 3.0 * cosine * cosine - 3.0 * friction * sine * cosine;
         assert!(pivot.abs() < 1e-5, "{pivot:e}");
         scene.run(0.3);
-        // The momentum that rounding errors leave is 1e-12 of it at most.
+        // Friction takes energy; steps at a tolerance of 1e-12 add little.
         assert!(scene.energy() <= before + 1e-9, "{} J, {before} J", scene.energy());
     }
 }
@@ -85,7 +94,7 @@ fn a_rod_parts_from_the_floor() {
     scene.run(0.1);
     let [event] = &scene.events.0[..] else { panic!("{:?}", scene.events.0) };
     assert_eq!((event.cause, event.modes), (Cause::Unloaded, [Mode::Slide, Mode::Open]));
-    // The normal acceleration of the end is zero without a force: (m g − m ω² sin φ) of the centre, with the rod of 1 m to it.
+    // Without a force, the end at 1 m from the centre has the vertical acceleration ω² sin φ − g: there it is zero.
     let (mut scene, time) = (sliding(1.5, 1.28, -1.0, 3.0), event.time);
     scene.run(time);
     let centrifugal = scene.v()[2].powi(2) * scene.q[2].sin();

@@ -17,7 +17,7 @@ use mbd_runtime::{Conjugate, Constrained, Dual, Real, Scalar};
 use nalgebra::{Matrix3, Vector3};
 
 use super::fields::{field, hills};
-use super::jams::rod;
+use super::jams::{rod, sliding_state};
 use super::known::{ball, block};
 use super::scene::{model, Events};
 
@@ -405,9 +405,7 @@ impl Family for SlidingRod {
     }
 
     fn start<S: Real>(&self, x: &[S], _: &mut ContactInterpreter<S>) -> (Vec<S>, Vec<S>) {
-        let [angle, speed] = [0.47_f64, -5.0].map(|x| [x.sin(), x.cos(), x].map(S::constant));
-        let ([sine, cosine, angle], speed) = (angle, speed[2]);
-        (vec![S::zero(), sine, angle], vec![speed * cosine, x[0] - speed * sine, x[0]])
+        sliding_state(0.47, -5.0, x[0])
     }
 }
 

@@ -87,7 +87,7 @@ where
             error,
             StepError::StepTooSmall { .. } | StepError::NoConvergence { .. } | StepError::NotFinite { .. }
         );
-        if !ends {
+        if !(system.rubs && ends) {
             return Err(error.into());
         }
         self.crowd(self.start.0)?;
@@ -114,8 +114,8 @@ where
         self.jam_sliding(system, t, core::slice::from_ref(how), None, error, observer).map(Some)
     }
 
-    /// Jams at the state in `self.q` and `self.p`, if a contact slides there; the one with the largest force is what is told, of
-    /// which a part may be `left`, if one is given.
+    /// Jams at the state in `self.q` and `self.p`, where a contact slides. That with the largest force is told; a part of this force
+    /// may be `left`, if one is given.
     fn jam_sliding(
         &mut self,
         system: &mut WithContacts<Y>,
@@ -125,9 +125,6 @@ where
         error: HybridError,
         observer: &mut impl ContactObserver<Y>,
     ) -> Result<ContactEvent<Y::Scalar>, HybridError> {
-        if !system.rubs {
-            return Err(error);
-        }
         let zero = Y::Scalar::zero();
         system.look_at_all(t, &self.q, &self.p);
         self.free_momenta(system);

@@ -64,16 +64,19 @@ pub enum Effort {
     Sweeps(u32),
 }
 
+/// Relative residual of impulses and forces, unless another is asked for.
+const TOLERANCE: f64 = 1e-11;
+
 impl Default for Effort {
     fn default() -> Self {
-        Effort::ToTolerance { tolerance: 1e-11, rounds: 60 }
+        Effort::ToTolerance { tolerance: TOLERANCE, rounds: 60 }
     }
 }
 
 impl Effort {
     /// A single round to the default tolerance, without random starts.
     pub(super) const fn brief() -> Self {
-        Effort::ToTolerance { tolerance: 1e-11, rounds: 1 }
+        Effort::ToTolerance { tolerance: TOLERANCE, rounds: 1 }
     }
 }
 

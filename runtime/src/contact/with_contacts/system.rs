@@ -28,6 +28,7 @@ impl<Y: Touching> System for WithContacts<Y> {
             }
         }
     }
+
     fn rounding(&self) -> f64 {
         self.rounding
     }
