@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::Path;
 
-use multibody::codegen::code::{compile, Code};
+use multibody::codegen::code::{compile, Code, Programs};
 use multibody::codegen::generate::quantity;
 use multibody::codegen::generate::trace;
 use multibody::codegen::model::{Gravity, Model, Value};
@@ -123,13 +123,14 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
         return mentioned("making the code of every set of modes", || modes::count(&plan, &options, out));
     }
     let counts = mentioned("counting the operations of every output", || all(&plan, &options))?;
+    let loops = mentioned("counting the operations of loops", || loops(&plan, &counts, &options))?;
     let parts = match options.outputs.first() {
         Some(&group) => mentioned("counting what parts of the scene cost", || parts(&plan, &options, group))?,
         None => Vec::new(),
     };
     let speeds = mentioned("estimating the speed of every output", || speeds(&plan, &options))?;
     if args.json {
-        return as_json(&plan, &counts, &speeds, &parts, out);
+        return as_json(&plan, &counts, &loops, &speeds, &parts, out);
     }
     writeln!(
         out,
@@ -143,6 +144,11 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
     let rolled: Vec<&str> = counts.iter().filter(|c| c.rolled).map(|c| c.group.name()).collect();
     if !rolled.is_empty() {
         writeln!(out, "\nOf rolled code, loops over like links, times the number of turns: {}", rolled.join(", "))?;
+    }
+    let loops: Vec<String> = loops.iter().map(|(output, c)| format!("{} {}", output.name(), c.total())).collect();
+    if !loops.is_empty() {
+        writeln!(out, "\nThat is straight-line code. Where links or branches are alike, loops over them are generated, whose body does for each what")?;
+        writeln!(out, "one of them needs. They execute: {}", loops.join(", "))?;
     }
     speed_table(&speeds, out)?;
     candidates(&plan, &tried, &options, args.candidates, out)?;
@@ -235,6 +241,14 @@ fn of_output(plan: &Plan, group: Output, options: &Options) -> Outcome<OutputCou
     let sweeps = quantities.into_iter().map(|what| (quantity(what), of(what)));
     let sweeps = sweeps.filter(|(_, c)| *c != Counts::default()).collect();
     Ok(OutputCounts { group, counts: code.counts(), sweeps, rolled: matches!(code, Code::Rolled(_)) })
+}
+
+/// Counts of the generated code, for the outputs in which this has loops in place of the straight-line code that `counted`
+/// has.
+fn loops(plan: &Plan, counted: &[OutputCounts], options: &Options) -> Outcome<Vec<(Output, Counts)>> {
+    let programs = Programs::new(plan, options).map_err(generate::failure)?.with_like_branches(plan, options);
+    let other = |(output, counts): &(Output, Counts)| counted.iter().any(|c| c.group == *output && c.counts != *counts);
+    Ok(programs.counts(options).into_iter().filter(other).collect())
 }
 
 /// The table of counts, with a row for each sweep of the outputs in `detailed`.
@@ -332,7 +346,14 @@ fn numbers(c: &Counts) -> serde_json::Map<String, serde_json::Value> {
     pairs.into_iter().map(|(k, n)| (k.to_string(), json!(n))).collect()
 }
 
-fn as_json(plan: &Plan, counts: &[OutputCounts], speeds: &[Speed], parts: &[Part], out: &mut dyn Write) -> Outcome {
+fn as_json(
+    plan: &Plan,
+    counts: &[OutputCounts],
+    loops: &[(Output, Counts)],
+    speeds: &[Speed],
+    parts: &[Part],
+    out: &mut dyn Write,
+) -> Outcome {
     let outputs: Vec<_> = counts
         .iter()
         .map(|c| {
@@ -349,6 +370,9 @@ fn as_json(plan: &Plan, counts: &[OutputCounts], speeds: &[Speed], parts: &[Part
             output.insert("output".into(), json!(c.group.name()));
             output.insert("sweeps".into(), json!(sweeps));
             output.insert("rolled".into(), json!(c.rolled));
+            if let Some((_, counts)) = loops.iter().find(|(output, _)| *output == c.group) {
+                output.insert("loops".into(), json!(numbers(counts)));
+            }
             for s in speeds.iter().filter(|s| s.group == c.group) {
                 let mut speed = numbers(&s.counts);
                 speed.insert("instructions".into(), json!(s.instructions));

@@ -104,6 +104,26 @@ fn counts_of_long_chains() {
     assert_eq!(2 * (b - a), c - b);
 }
 
+/// Where loops are generated, their operations are told beside those of straight-line code, as generated code has them.
+#[test]
+fn counts_of_loops() {
+    let folder = folder("count_loops");
+    for model in [&["models/solo12.urdf", "--base", "floating"][..], &["models/chain100.toml"]] {
+        let of = |command, rest: &[&str]| run(&[&[command], model, &["--outputs", "rates"], rest].concat());
+        let rates = &json_of(&good(of("count", &["--json"])))["outputs"][0];
+        let loops = rates["loops"]["total"].as_u64().expect("a number");
+        assert!(loops > rates["total"].as_u64().expect("a number"));
+        let file = folder.join("code.rs").display().to_string();
+        good(of("generate", &["-o", &file]));
+        let code = std::fs::read_to_string(&file).expect("generated code");
+        assert!(code.contains(&format!("/// {loops} operations: ")), "{model:?}: {loops}");
+        let table = good(of("count", &[]));
+        assert!(out(&table).contains(&format!("They execute: rates {loops}\n")), "{}", out(&table));
+    }
+    let none = json_of(&good(run(&["count", "models/ur5.urdf", "--outputs", "rates", "--json"])));
+    assert!(none["outputs"][0].get("loops").is_none());
+}
+
 #[test]
 fn counts() {
     let output = good(run(&["count", "models/chain6.toml", "--outputs", "all", "--json"]));

@@ -24,8 +24,7 @@ pub fn build(
     options: &Options,
     find: impl Fn(&Tree<Expr>, &[bool]) -> Vec<Run>,
 ) -> Option<OutputProgram<RolledProgram>> {
-    // Multipliers have the sweeps of accelerations, and rows, whose accelerations links do not carry.
-    let sweeps = OutputSweeps::of(group).filter(|_| group != Output::Multipliers)?;
+    let sweeps = OutputSweeps::of(group)?;
     let graph = Graph::default();
     let given = SymbolicInputs::new(&graph, plan, group.spec(), options);
     let mut tree: Tree<Expr> = plan.tree(&given.params);

@@ -33,10 +33,21 @@ pub enum LinkInput {
     Carried(usize, usize),
 }
 
+/// An earlier place among what a pass carries.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Twin {
+    /// Its number.
+    pub place: usize,
+    /// Whether the value is the negative of the one there.
+    pub opposite: bool,
+}
+
 /// A pass through one turn.
 pub struct LinkPass<'g> {
-    /// Symbols carried in; constants where every turn takes in the same.
+    /// Symbols carried in; constants where every turn takes in the same, and where [`LinkPass::twins`] has the value.
     pub incoming: Vec<Expr<'g>>,
+    /// Where the value is that of an earlier place in all turns: that place.
+    pub twins: Vec<Option<Twin>>,
     /// What is carried out.
     pub outgoing: Vec<Expr<'g>>,
     /// Where the negative is carried, because that is what a turn computes.
@@ -138,7 +149,7 @@ impl<'g, 'a> Link<'g, 'a> {
     }
 
     /// A pass, carrying in `first` at its first turn. What is constant there and stays so from turn to turn is a
-    /// constant of the loop; the rest become symbols.
+    /// constant of the loop, and what equals another value there and stays so is carried once; the rest become symbols.
     pub fn pass(&mut self, pass: usize, direction: SweepDirection, first: &[Expr<'_>]) {
         let number = self.passes.len();
         let mut known: Vec<Option<f64>> =
@@ -150,11 +161,16 @@ impl<'g, 'a> Link<'g, 'a> {
             })
             .collect();
         let signed = |e: Expr<'g>, negative: bool| if negative { -e } else { e };
+        let mut pairs = twins(first, |_, _, _| true);
+        let mut newly = true;
         let mut negative = vec![false; first.len()];
         // Signs are chosen once: choosing them again could go on for ever.
         let mut choose = true;
         loop {
-            let symbol = |k: usize| signed(symbols[k], negative[k]);
+            let symbol = |k: usize| match pairs[k] {
+                Some(twin) => signed(signed(symbols[twin.place], negative[twin.place]), twin.opposite),
+                None => signed(symbols[k], negative[k]),
+            };
             let incoming: Vec<Expr<'g>> =
                 known.iter().enumerate().map(|(k, known)| known.map_or(symbol(k), Expr::Const)).collect();
             let mut stage = self.stage.clone();
@@ -166,9 +182,17 @@ impl<'g, 'a> Link<'g, 'a> {
                     settled = false;
                 }
             }
+            // Zero is its own negative.
+            let both_start_at_zero = |j: usize, k: usize| newly && is_zero(&first[j]) && is_zero(&first[k]);
+            let still =
+                twins(&outgoing, |j, k, opposite| both_start_at_zero(j, k) || were_twins(&pairs, j, k, opposite));
+            newly = false;
+            settled &= still == pairs;
+            pairs = still;
             if settled && std::mem::take(&mut choose) {
-                for ((negative, out), known) in negative.iter_mut().zip(&outgoing).zip(&known) {
-                    *negative = known.is_none() && matches!(out, Expr::Node { neg: true, .. });
+                for (k, (negative, out)) in negative.iter_mut().zip(&outgoing).enumerate() {
+                    let own = known[k].is_none() && pairs[k].is_none();
+                    *negative = own && matches!(out, Expr::Node { neg: true, .. });
                 }
                 settled = !negative.contains(&true);
             }
@@ -179,7 +203,15 @@ impl<'g, 'a> Link<'g, 'a> {
                 }
                 let outgoing = outgoing.into_iter().zip(&negative).map(|(e, negative)| signed(e, *negative)).collect();
                 let end = self.graph.len();
-                self.passes.push(LinkPass { incoming: symbols_of(&incoming), outgoing, negative, end });
+                let mut incoming = symbols_of(&incoming);
+                for k in 0..first.len() {
+                    match known[k] {
+                        Some(_) => pairs[k] = None,
+                        None if pairs[k].is_some() => incoming[k] = Expr::zero(),
+                        None => {}
+                    }
+                }
+                self.passes.push(LinkPass { incoming, twins: pairs, outgoing, negative, end });
                 return;
             }
         }
@@ -243,7 +275,8 @@ impl<'g, 'a> Link<'g, 'a> {
         }
         let negative: Vec<bool> = outgoing.iter().map(|e| matches!(e, Expr::Node { neg: true, .. })).collect();
         let outgoing = symbols_of(&outgoing);
-        self.passes.push(LinkPass { incoming, outgoing, negative, end: self.graph.len() });
+        let twins = vec![None; outgoing.len()];
+        self.passes.push(LinkPass { incoming, twins, outgoing, negative, end: self.graph.len() });
     }
 
     /// What a pass hands on, as far as it depends on constants alone, in the turn with a given row of the table.
@@ -259,6 +292,42 @@ impl<'g, 'a> Link<'g, 'a> {
     pub fn finish(&mut self) -> Vec<Expr<'g>> {
         self.stage.finish(&self.given)
     }
+}
+
+fn is_zero(value: &Expr<'_>) -> bool {
+    matches!(value, Expr::Const(x) if *x == 0.0)
+}
+
+/// Whether one value is the other (`false`) or its negative (`true`).
+fn opposite(a: &Expr<'_>, b: &Expr<'_>) -> Option<bool> {
+    match (a, b) {
+        (Expr::Const(a), Expr::Const(b)) => {
+            [false, true].into_iter().find(|minus| a.to_bits() == if *minus { -b } else { *b }.to_bits())
+        }
+        (Expr::Node { id: a, neg: sign_a, .. }, Expr::Node { id: b, neg: sign_b, .. }) => {
+            (a == b).then_some(sign_a != sign_b)
+        }
+        _ => None,
+    }
+}
+
+/// For each value the first one before it that it equals, or whose negative it is. `allowed` says whether two values may
+/// be the same (`false`) or opposite (`true`).
+fn twins(values: &[Expr<'_>], allowed: impl Fn(usize, usize, bool) -> bool) -> Vec<Option<Twin>> {
+    let of = |k: usize| {
+        (0..k).find_map(|place| {
+            let opposite = opposite(&values[place], &values[k])?;
+            allowed(place, k, opposite).then_some(Twin { place, opposite })
+        })
+    };
+    (0..values.len()).map(of).collect()
+}
+
+/// Whether two values were the same (`false`) or opposite (`true`) so far.
+fn were_twins(twins: &[Option<Twin>], j: usize, k: usize, opposite: bool) -> bool {
+    let first = |k: usize| twins[k].map_or((k, false), |twin| (twin.place, twin.opposite));
+    let ((first_j, minus_j), (first_k, minus_k)) = (first(j), first(k));
+    first_j == first_k && (minus_j != minus_k) == opposite
 }
 
 /// The symbols without their signs.

@@ -116,23 +116,30 @@ impl<'m> MainLine<'m, '_> {
             return;
         }
         let number = links[k].passes.len() - 1;
-        let negative = &links[k].passes[number].negative;
+        let (negative, twins) = (&links[k].passes[number].negative, &links[k].passes[number].twins);
         start.iter_mut().zip(negative).filter(|(_, negative)| **negative).for_each(|(e, _)| *e = -*e);
         let next = &mut self.next_input;
         let graph = self.graph;
         let end: Vec<Expr<'m>> = links[k].passes[number]
             .outgoing
             .iter()
-            .map(|out| match *out {
+            .zip(twins)
+            .map(|(out, twin)| match *out {
                 Expr::Const(x) => Expr::Const(x),
+                // What another place carries has none of its own.
+                Expr::Node { .. } if twin.is_some() => Expr::Const(0.0),
                 Expr::Node { .. } => {
                     *next += 1;
                     graph.input(*next - 1)
                 }
             })
             .collect();
-        let signed = |(out, negative): (&Expr<'m>, &bool)| if *negative { -*out } else { *out };
-        let mut out = end.iter().zip(negative).map(signed);
+        let signed = |out: Expr<'m>, negative: bool| if negative { -out } else { out };
+        let own = |k: usize| signed(end[k], negative[k]);
+        let mut out = twins.iter().enumerate().map(|(k, twin)| match twin {
+            Some(twin) => signed(own(twin.place), twin.opposite),
+            None => own(k),
+        });
         let mut next = || out.next().expect("a pass hands on as much as it takes in");
         match direction {
             SweepDirection::TipToBase => stage.carried(pass, to, given, |e| *e = *e + next()),

@@ -116,14 +116,14 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
         }
     }
 
-    /// Rows of the constraints, after [`Sweep::paths`]. Visits no node.
+    /// Rows of the constraints, after [`Sweep::paths`], in the same pass. Visits no node.
     pub(super) const fn rows<const ALL: bool>() -> Self {
         Sweep {
             needed: |tree| !T::PLAIN && !tree.constraints.is_empty(),
             // Rows that are constants of the body at the end of a chain: nothing pulls at its joints as they turn.
             rolls: |tree| tree.constraints.iter().all(Constraint::gauge),
-            begin: |cx| cx.sweeps.set_rows(cx.w, ALL),
-            ..Sweep::idle(SweepDirection::TipToBase)
+            end: |cx| cx.sweeps.set_rows(cx.w, ALL),
+            ..Sweep::idle(SweepDirection::BaseToTip)
         }
     }
 

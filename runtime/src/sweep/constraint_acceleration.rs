@@ -15,7 +15,6 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
     /// nodes.
     pub(super) const ROW_ACCELERATIONS: Self = Sweep {
         needed: |tree| !T::PLAIN && !tree.constraints.is_empty(),
-        rolls: |_| false,
         end: |cx| cx.sweeps.row_accelerations(&cx.given.inputs, cx.w),
         ..Self::VELOCITY
     };

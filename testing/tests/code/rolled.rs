@@ -61,6 +61,10 @@ fn compare(model: &Model, seed: u64, options: &Options) -> usize {
                 i.bias(&s.q, &s.v, &mut v);
                 v.clone()
             }
+            Output::Multipliers => {
+                i.multipliers(0.0, &s.q, &s.v, &mut rows);
+                rows.clone()
+            }
             Output::ProjectMomenta => {
                 let mut freed = p.clone();
                 i.project_momenta(0.0, &s.q, &mut freed, &mut v, &mut rows);
@@ -157,7 +161,14 @@ fn closed_chains() {
             continue;
         }
         let plan = search::plan(&model, options.plan);
-        for output in [Output::Rates, Output::Energy, Output::ProjectMomenta, Output::PositionCorrection] {
+        for output in [
+            Output::Rates,
+            Output::Energy,
+            Output::Accelerations,
+            Output::Multipliers,
+            Output::ProjectMomenta,
+            Output::PositionCorrection,
+        ] {
             let is_rolled = rolled(&plan, output, &options).is_some();
             assert!(is_rolled, "seed {seed}: {output:?} has no rolled code, {:?}", options.plan);
         }
