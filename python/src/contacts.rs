@@ -9,7 +9,7 @@ use multibody::runtime::constrained::{Effort, Projection, Stabilisation, WithPos
 use multibody::runtime::contact::{
     Contact, ContactMotion, HybridError, ModeTable, RegimeChoice, RegimeRules, WithContacts,
 };
-use multibody::runtime::integrate::{Dop853, Rk4, Step, StepError, Stepper, Tolerances};
+use multibody::runtime::integrate::{AutoSwitch, Dop853, Radau5, Rk4, Step, StepError, Stepper, Tolerances};
 
 use crate::errors::Failed;
 use crate::machines::set;
@@ -75,8 +75,14 @@ fn method(settings: &Settings, system: &System) -> (Method, Projection<System>, 
     };
     let effort = Effort { energy: f64::INFINITY, ..Effort::default() };
     let hold = || Projection::new(system, Stabilisation::default(), effort);
-    let fixed = Step::Fixed(settings.dt);
-    let step = settings.tolerance.map_or(fixed, |tolerance| Step::Adaptive(Tolerances::new(tolerance)));
+    let (method, step) = match settings.tolerance {
+        None => (method, Step::Fixed(settings.dt)),
+        Some(tolerance) => {
+            // What slides slowly is stiff.
+            let method = Box::new(AutoSwitch::new(system, method, Radau5::new(system)));
+            (method as Box<dyn Stepper<System>>, Step::Adaptive(Tolerances::new(tolerance)))
+        }
+    };
     (WithPostStep::new(system, method, hold()), hold(), step)
 }
 

@@ -148,6 +148,21 @@ fn many_thrown_quadrupeds_land() {
     }
 }
 
+/// In these motions events follow one another at one instant, each of which changes nothing or leads back to the one before, or
+/// the shortest jam has no impulses.
+#[test]
+fn events_that_crowd_come_to_an_end() {
+    for (seed, time) in [(114, 0.04), (125, 0.16), (134, 0.05)] {
+        let mut scene = thrown(include_str!("../../../models/contacts/quadruped_hop.toml"), seed);
+        scene.tolerance = 1e-7;
+        scene.start();
+        let before = scene.energy();
+        scene.try_run(time).unwrap_or_else(|error| panic!("{seed}: {error}"));
+        assert!(statistics(&scene).jams > 0, "{seed}: {:?}", statistics(&scene));
+        assert!(scene.energy() < before + 1e-5, "{seed}: {} J, then {} J", before, scene.energy());
+    }
+}
+
 /// In these motions a foot jams, in most of them while it slides. (Where that changes, others of the first 24 will do as well.)
 #[test]
 fn thrown_quadrupeds_land() {

@@ -7,7 +7,7 @@
 //! A motion comes to such a place by an event, or while it slides: the normal force then grows without bound, and steps
 //! shrink without end.
 
-use super::{Cause, ContactEvent, ContactObserver, Hybrid, HybridError};
+use super::{Cause, ContactEvent, ContactObserver, Crowd, Hybrid, HybridError};
 use crate::contact::solver::energy;
 use crate::contact::{solve, ContactError, Impact, Touching, WithContacts};
 use crate::error::StepError;
@@ -32,9 +32,12 @@ const TRIES: [[f64; 2]; 9] = [
 ];
 /// Number of those that are as short as rounding errors let them be.
 const SHORT: usize = 5;
+/// The largest speed counts as this many times the one below which bodies stop, at least: the longest time takes from all of them
+/// what is that slow.
+const SLOW: f64 = 1e4;
 /// Least speed that the short time of a jam leads to, m/s.
 const LEAST: f64 = 1e-12;
-/// After every so many events at one instant, one that changes nothing is taken for a jam.
+/// So many events that change nothing at one instant are taken for a jam.
 const STUCK: u32 = 10;
 /// Part of the largest force that is left after a jam, at most, where steps have shrunk before it.
 const LEFT: f64 = 0.1;
@@ -97,21 +100,27 @@ where
         self.jam_sliding(system, self.start.0, &TRIES, left, error.into(), observer)
     }
 
-    /// Jams after an event at which nothing changes, where many of them follow one another, if a contact slides there: a normal
-    /// force that goes through infinity has other signs on both sides, and no modes go on from there. A longer time each time.
+    /// Jams after an event where many of them follow one another at one instant, if a contact slides there: a normal force that
+    /// goes through infinity has other signs on both sides, and no modes go on from there, or each event leads to the one before.
+    /// A longer time each time. Of events that change modes, each contact may have some.
     pub(super) fn jam_if_stuck(
         &mut self,
         system: &mut WithContacts<Y>,
+        changes: bool,
         observer: &mut impl ContactObserver<Y>,
     ) -> Result<Option<ContactEvent<Y::Scalar>>, HybridError> {
-        let (t, events) = self.crowded;
-        let round = (events / STUCK) as usize;
-        if !(round > 0 && events % STUCK == 0 && system.rubs) {
+        let Crowd { time, events, stuck, jams } = self.crowd;
+        let most = if changes { STUCK * (1 + self.touching.count as u32) } else { STUCK };
+        if !(stuck >= most && system.rubs) {
             return Ok(None);
         }
-        let error = HybridError::TooManyEvents { time: t.to_f64(), events };
-        let how = TRIES[SHORT..].get(round - 1).ok_or(error)?;
-        self.jam_sliding(system, t, core::slice::from_ref(how), None, error, observer).map(Some)
+        let tries = TRIES.get(SHORT + jams..).unwrap_or_default();
+        if tries.is_empty() {
+            return Ok(None);
+        }
+        self.crowd = Crowd { time, events, stuck: 0, jams: jams + 1 };
+        let error = HybridError::TooManyEvents { time: time.to_f64(), events };
+        self.jam_sliding(system, time, tries, None, error, observer).map(Some)
     }
 
     /// Jams at the state in `self.q` and `self.p`, where a contact slides. That with the largest force is told; a part of this force
@@ -173,7 +182,8 @@ where
         self.statistics.impacts += 1;
         self.statistics.jams += 1;
         for how in tries {
-            let impact = self.press(system, t, *how)?;
+            // A problem without a solution changes nothing.
+            let Ok(impact) = self.press(system, t, *how) else { continue };
             if let Some(event) = event.as_deref_mut() {
                 let before = event.impact.map_or(zero, |impact| impact.energy);
                 event.impact = Some(Impact { energy: before + impact.energy, ..impact });
@@ -232,11 +242,12 @@ where
         self.touching.assemble(system, t, &self.q, false);
         self.touching.free_accelerations(system, t, &self.q);
         let most = largest(first(self.touching.b.as_ref(), self.touching.rows()));
+        let slow = Y::Scalar::constant(SLOW * self.rules.slip);
         let fastest = self
             .touching
             .order()
             .iter()
-            .fold(zero, |fastest, &k| largest(&[fastest, system.speed(k), system.gap_rate(k)]));
+            .fold(slow, |fastest, &k| largest(&[fastest, system.speed(k), system.gap_rate(k)]));
         let seed = Y::Scalar::constant(part) * fastest + Y::Scalar::constant(LEAST);
         let time = if most > zero { seed / most } else { zero };
         for i in 0..self.touching.count {

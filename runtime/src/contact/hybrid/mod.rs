@@ -76,6 +76,18 @@ struct Departure<S> {
     speed: S,
 }
 
+/// Events at one instant.
+#[derive(Clone, Copy, Debug)]
+struct Crowd<S> {
+    time: S,
+    /// How many follow the first.
+    events: u32,
+    /// How many of them since the last jam.
+    stuck: u32,
+    /// Jams for which too many events followed one another.
+    jams: usize,
+}
+
 /// A motion with contacts by a method `M`. It owns the state; [`Hybrid::state`] copies it.
 ///
 /// Between events, the mechanism moves with the contacts that are closed as constraints. Within each step, gaps, normal
@@ -134,7 +146,7 @@ pub struct Hybrid<Y: Touching, M> {
     /// Whether the last event was one of redundant forces that changed nothing, so that the next step goes on.
     unchanged: bool,
     /// Events at the last instant.
-    crowded: (Y::Scalar, u32),
+    crowd: Crowd<Y::Scalar>,
     statistics: ContactStatistics,
 }
 
@@ -201,7 +213,7 @@ where
             rests: false,
             forced: None,
             unchanged: false,
-            crowded: (t, 0),
+            crowd: Crowd { time: t, events: 0, stuck: 0, jams: 0 },
             statistics: ContactStatistics::default(),
         };
         hybrid.place(system, t, q, p)?;
@@ -354,11 +366,13 @@ where
             return Ok(None);
         };
         let t = self.go_to(system, &found)?;
-        let Some(event) = self.resolve(system, t, &found)? else {
-            return self.jam_if_stuck(system, observer);
-        };
-        observer.event(system, &event);
-        Ok(Some(event))
+        let switches = self.statistics.switches;
+        let event = self.resolve(system, t, &found)?;
+        if let Some(event) = &event {
+            observer.event(system, event);
+        }
+        let changes = event.is_some_and(|event| event.impact.is_some()) || self.statistics.switches > switches;
+        Ok(self.jam_if_stuck(system, changes, observer)?.or(event))
     }
 
     /// Notes the state where the last step began, if [`Hybrid::advance`] has not: a step that is not searched needs none.
