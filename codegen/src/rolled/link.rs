@@ -11,6 +11,7 @@ use mbd_runtime::Scalar;
 use super::pass_state::{read, PassState};
 use super::runs::{map_node, Run, Slot};
 use super::turn_constants::constant;
+use super::twins::{twins, were_twins, Twin};
 use super::SweepDirection;
 use crate::output::Output;
 use crate::symbolic::{Expr, Graph};
@@ -31,15 +32,6 @@ pub enum LinkInput {
     Tau(usize),
     /// What a pass carries in: pass and place.
     Carried(usize, usize),
-}
-
-/// An earlier place among what a pass carries.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Twin {
-    /// Its number.
-    pub place: usize,
-    /// Whether the value is the negative of the one there.
-    pub opposite: bool,
 }
 
 /// A pass through one turn.
@@ -183,7 +175,9 @@ impl<'g, 'a> Link<'g, 'a> {
                 }
             }
             // Zero is its own negative.
-            let both_start_at_zero = |j: usize, k: usize| newly && is_zero(&first[j]) && is_zero(&first[k]);
+            let both_start_at_zero = |j: usize, k: usize| {
+                newly && [j, k].into_iter().all(|k| matches!(first[k], Expr::Const(x) if x == 0.0))
+            };
             let still =
                 twins(&outgoing, |j, k, opposite| both_start_at_zero(j, k) || were_twins(&pairs, j, k, opposite));
             newly = false;
@@ -292,42 +286,6 @@ impl<'g, 'a> Link<'g, 'a> {
     pub fn finish(&mut self) -> Vec<Expr<'g>> {
         self.stage.finish(&self.given)
     }
-}
-
-fn is_zero(value: &Expr<'_>) -> bool {
-    matches!(value, Expr::Const(x) if *x == 0.0)
-}
-
-/// Whether one value is the other (`false`) or its negative (`true`).
-fn opposite(a: &Expr<'_>, b: &Expr<'_>) -> Option<bool> {
-    match (a, b) {
-        (Expr::Const(a), Expr::Const(b)) => {
-            [false, true].into_iter().find(|minus| a.to_bits() == if *minus { -b } else { *b }.to_bits())
-        }
-        (Expr::Node { id: a, neg: sign_a, .. }, Expr::Node { id: b, neg: sign_b, .. }) => {
-            (a == b).then_some(sign_a != sign_b)
-        }
-        _ => None,
-    }
-}
-
-/// For each value the first one before it that it equals, or whose negative it is. `allowed` says whether two values may
-/// be the same (`false`) or opposite (`true`).
-fn twins(values: &[Expr<'_>], allowed: impl Fn(usize, usize, bool) -> bool) -> Vec<Option<Twin>> {
-    let of = |k: usize| {
-        (0..k).find_map(|place| {
-            let opposite = opposite(&values[place], &values[k])?;
-            allowed(place, k, opposite).then_some(Twin { place, opposite })
-        })
-    };
-    (0..values.len()).map(of).collect()
-}
-
-/// Whether two values were the same (`false`) or opposite (`true`) so far.
-fn were_twins(twins: &[Option<Twin>], j: usize, k: usize, opposite: bool) -> bool {
-    let first = |k: usize| twins[k].map_or((k, false), |twin| (twin.place, twin.opposite));
-    let ((first_j, minus_j), (first_k, minus_k)) = (first(j), first(k));
-    first_j == first_k && (minus_j != minus_k) == opposite
 }
 
 /// The symbols without their signs.

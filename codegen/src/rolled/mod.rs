@@ -19,6 +19,7 @@ mod siblings;
 mod sines;
 mod together;
 mod turn_constants;
+mod twins;
 
 use std::collections::BTreeSet;
 

@@ -109,7 +109,7 @@ where
         changes: bool,
         observer: &mut impl ContactObserver<Y>,
     ) -> Result<Option<ContactEvent<Y::Scalar>>, HybridError> {
-        let Crowd { time, events, stuck, jams } = self.crowd;
+        let Crowd { events, stuck, jams, .. } = self.crowd;
         let most = if changes { STUCK * (1 + self.touching.count as u32) } else { STUCK };
         if !(stuck >= most && system.rubs) {
             return Ok(None);
@@ -118,9 +118,10 @@ where
         if tries.is_empty() {
             return Ok(None);
         }
-        self.crowd = Crowd { time, events, stuck: 0, jams: jams + 1 };
-        let error = HybridError::TooManyEvents { time: time.to_f64(), events };
-        self.jam_sliding(system, time, tries, None, error, observer).map(Some)
+        (self.crowd.stuck, self.crowd.jams) = (0, jams + 1);
+        let t = self.solver.time();
+        let error = HybridError::TooManyEvents { time: t.to_f64(), events };
+        self.jam_sliding(system, t, tries, None, error, observer).map(Some)
     }
 
     /// Jams at the state in `self.q` and `self.p`, where a contact slides. That with the largest force is told; a part of this force
