@@ -6,7 +6,9 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=$PWD/target
 venv=target/python-venv
-[ -x $venv/bin/dask ] || {
+# A virtual environment does not work at another path than its own.
+$venv/bin/dask --version > /dev/null 2>&1 || {
+    rm -rf $venv
     python3 -m venv $venv
     $venv/bin/pip install --quiet 'maturin>=1.16,<2' 'numpy>=1.22' pytest 'gymnasium>=1.0' dask distributed
 }
