@@ -159,6 +159,7 @@ fn events_that_crowd_come_to_an_end() {
         let before = scene.energy();
         scene.try_run(time).unwrap_or_else(|error| panic!("{seed}: {error}"));
         assert!(statistics(&scene).jams > 0, "{seed}: {:?}", statistics(&scene));
+        // Steps may err by the tolerance of the momenta, some 10 kg m/s, at speeds of some 10 m/s.
         assert!(scene.energy() < before + 1e-5, "{seed}: {} J, then {} J", before, scene.energy());
     }
 }

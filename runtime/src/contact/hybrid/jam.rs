@@ -32,8 +32,8 @@ const TRIES: [[f64; 2]; 9] = [
 ];
 /// Number of those that are as short as rounding errors let them be.
 const SHORT: usize = 5;
-/// The largest speed counts as this many times the one below which bodies stop, at least: the longest time takes from all of them
-/// what is that slow.
+/// What counts as the largest speed is at least so many times the one below which bodies stop at an event: the longest time then
+/// stops all that are slower than that.
 const SLOW: f64 = 1e4;
 /// Least speed that the short time of a jam leads to, m/s.
 const LEAST: f64 = 1e-12;

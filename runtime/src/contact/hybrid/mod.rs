@@ -79,6 +79,7 @@ struct Departure<S> {
 /// Events at one instant.
 #[derive(Clone, Copy, Debug)]
 struct Crowd<S> {
+    /// Time of the first, s.
     time: S,
     /// How many follow the first.
     events: u32,
