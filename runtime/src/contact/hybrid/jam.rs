@@ -7,7 +7,7 @@
 //! A motion comes to such a place by an event, or while it slides: the normal force then grows without bound, and steps
 //! shrink without end.
 
-use super::{Cause, ContactEvent, ContactObserver, Crowd, Hybrid, HybridError};
+use super::{Cause, ContactEvent, ContactObserver, Hybrid, HybridError};
 use crate::contact::solver::energy;
 use crate::contact::{solve, ContactError, Impact, Touching, WithContacts};
 use crate::error::StepError;
@@ -41,6 +41,29 @@ const LEAST: f64 = 1e-12;
 const STUCK: u32 = 10;
 /// Part of the largest force that is left after a jam, at most, where steps have shrunk before it.
 const LEFT: f64 = 0.1;
+
+/// Events are at one instant that are no more than so many times the rounding error of the time later than the first.
+const INSTANT: f64 = 1e3;
+
+/// Events at one instant.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Crowd<S> {
+    /// Time of the first, s.
+    time: S,
+    /// How many follow the first.
+    events: u32,
+    /// How many of them since the last jam.
+    stuck: u32,
+    /// Jams for which too many events followed one another.
+    jams: usize,
+}
+
+impl<S> Crowd<S> {
+    /// The first, at time `time` (s).
+    pub(super) fn at(time: S) -> Self {
+        Crowd { time, events: 0, stuck: 0, jams: 0 }
+    }
+}
 
 impl<Y, M> Hybrid<Y, M>
 where
@@ -98,6 +121,20 @@ where
         copy(self.p.as_mut(), self.start.2.as_ref());
         let left = Some(Y::Scalar::constant(LEFT));
         self.jam_sliding(system, self.start.0, &TRIES, left, error.into(), observer)
+    }
+
+    /// Counts the events at one instant.
+    pub(super) fn crowd(&mut self, t: Y::Scalar) -> Result<(), HybridError> {
+        let Crowd { time, events, stuck, jams } = self.crowd;
+        let same = !((t - time).to_f64() > INSTANT * Y::Scalar::epsilon() * t.to_f64().abs());
+        self.crowd = match same {
+            true => Crowd { time, events: events + 1, stuck: stuck + 1, jams },
+            false => Crowd::at(t),
+        };
+        match self.crowd.events > self.rules.events {
+            true => Err(HybridError::TooManyEvents { time: t.to_f64(), events: self.crowd.events }),
+            false => Ok(()),
+        }
     }
 
     /// Jams after an event where many of them follow one another at one instant, if a contact slides there: a normal force that

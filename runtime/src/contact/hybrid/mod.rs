@@ -22,6 +22,7 @@ use crate::integrate::{Limits, Solver, Statistics, Step, Stepper};
 use crate::lists::get_or;
 use crate::system::{Constrained, Real};
 use crate::Scalar;
+use jam::Crowd;
 use watch::Watched;
 
 /// A stretch of a motion without events: one step of the integration, or what comes before the event within it.
@@ -74,19 +75,6 @@ struct Departure<S> {
     time: S,
     /// Speed of departure, m/s; zero where there was none.
     speed: S,
-}
-
-/// Events at one instant.
-#[derive(Clone, Copy, Debug)]
-struct Crowd<S> {
-    /// Time of the first, s.
-    time: S,
-    /// How many follow the first.
-    events: u32,
-    /// How many of them since the last jam.
-    stuck: u32,
-    /// Jams for which too many events followed one another.
-    jams: usize,
 }
 
 /// A motion with contacts by a method `M`. It owns the state; [`Hybrid::state`] copies it.
@@ -214,7 +202,7 @@ where
             rests: false,
             forced: None,
             unchanged: false,
-            crowd: Crowd { time: t, events: 0, stuck: 0, jams: 0 },
+            crowd: Crowd::at(t),
             statistics: ContactStatistics::default(),
         };
         hybrid.place(system, t, q, p)?;

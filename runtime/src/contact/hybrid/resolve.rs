@@ -1,7 +1,7 @@
 //! What happens at an event: impulses, then the modes of the motion that follows.
 
 use super::watch::Found;
-use super::{Cause, ContactEvent, Crowd, Departure, Hybrid, HybridError};
+use super::{Cause, ContactEvent, Departure, Hybrid, HybridError};
 use crate::contact::with_contacts::CREEP;
 use crate::contact::{impact, Impact, ImpactOptions, Mode, Touch, Touching, WithContacts};
 use crate::integrate::Stepper;
@@ -20,9 +20,6 @@ const COLLECTED: f64 = 1e-6;
 
 /// How often modes are selected again at an event because holding the contacts has turned the slip of one round.
 const ROUNDS: u32 = 3;
-
-/// Events are at one instant that are no more than so many times the rounding error of the time later than the first.
-const INSTANT: f64 = 1e3;
 
 /// Speed of approach, m/s (rad/s), below which there is no impact.
 pub(super) const APPROACH: f64 = 1e-10;
@@ -82,20 +79,6 @@ where
         let off = self.p.as_ref().iter().zip(free).fold(zero, |most, (p, free)| largest(most, *p - *free));
         if off.to_f64() > COLLECTED * most.to_f64() {
             copy(self.p.as_mut(), free);
-        }
-    }
-
-    /// Counts the events at one instant.
-    pub(super) fn crowd(&mut self, t: Y::Scalar) -> Result<(), HybridError> {
-        let Crowd { time, events, stuck, jams } = self.crowd;
-        let same = !((t - time).to_f64() > INSTANT * Y::Scalar::epsilon() * t.to_f64().abs());
-        self.crowd = match same {
-            true => Crowd { time, events: events + 1, stuck: stuck + 1, jams },
-            false => Crowd { time: t, events: 0, stuck: 0, jams: 0 },
-        };
-        match self.crowd.events > self.rules.events {
-            true => Err(HybridError::TooManyEvents { time: t.to_f64(), events: self.crowd.events }),
-            false => Ok(()),
         }
     }
 
