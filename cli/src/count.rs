@@ -246,6 +246,9 @@ fn of_output(plan: &Plan, group: Output, options: &Options) -> Outcome<OutputCou
 /// Counts of the generated code, for the outputs in which this has loops in place of the straight-line code that `counted`
 /// has.
 fn loops(plan: &Plan, counted: &[OutputCounts], options: &Options) -> Outcome<Vec<(Output, Counts)>> {
+    // What is counted as loops is what is generated.
+    let outputs = counted.iter().filter(|c| !c.rolled).map(|c| c.group).collect();
+    let options = &Options { outputs, ..options.clone() };
     let programs = Programs::new(plan, options).map_err(generate::failure)?.with_like_branches(plan, options);
     let other = |(output, counts): &(Output, Counts)| counted.iter().any(|c| c.group == *output && c.counts != *counts);
     Ok(programs.counts(options).into_iter().filter(other).collect())

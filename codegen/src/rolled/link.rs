@@ -11,7 +11,7 @@ use mbd_runtime::Scalar;
 use super::pass_state::{read, PassState};
 use super::runs::{map_node, Run, Slot};
 use super::turn_constants::constant;
-use super::twins::{twins, were_twins, Twin};
+use super::twins::{signed, value, Twin, Twins};
 use super::SweepDirection;
 use crate::output::Output;
 use crate::symbolic::{Expr, Graph};
@@ -146,23 +146,14 @@ impl<'g, 'a> Link<'g, 'a> {
         let number = self.passes.len();
         let mut known: Vec<Option<f64>> =
             first.iter().map(|e| if let Expr::Const(x) = e { Some(*x) } else { None }).collect();
-        let symbols: Vec<Expr<'g>> = (0..first.len())
-            .map(|k| {
-                self.inputs.push(LinkInput::Carried(number, k));
-                self.graph.input(self.inputs.len() - 1)
-            })
-            .collect();
-        let signed = |e: Expr<'g>, negative: bool| if negative { -e } else { e };
-        let mut pairs = twins(first, |_, _, _| true);
-        let mut newly = true;
+        let symbols: Vec<Expr<'g>> = (0..first.len()).map(|k| self.symbol(number, k)).collect();
+        let mut twins = Twins::before(first);
         let mut negative = vec![false; first.len()];
         // Signs are chosen once: choosing them again could go on for ever.
         let mut choose = true;
         loop {
-            let symbol = |k: usize| match pairs[k] {
-                Some(twin) => signed(signed(symbols[twin.place], negative[twin.place]), twin.opposite),
-                None => signed(symbols[k], negative[k]),
-            };
+            let own = |k: usize| signed(symbols[k], negative[k]);
+            let symbol = |k: usize| value(twins.of(k), k, own);
             let incoming: Vec<Expr<'g>> =
                 known.iter().enumerate().map(|(k, known)| known.map_or(symbol(k), Expr::Const)).collect();
             let mut stage = self.stage.clone();
@@ -174,18 +165,10 @@ impl<'g, 'a> Link<'g, 'a> {
                     settled = false;
                 }
             }
-            // Zero is its own negative.
-            let both_start_at_zero = |j: usize, k: usize| {
-                newly && [j, k].into_iter().all(|k| matches!(first[k], Expr::Const(x) if x == 0.0))
-            };
-            let still =
-                twins(&outgoing, |j, k, opposite| both_start_at_zero(j, k) || were_twins(&pairs, j, k, opposite));
-            newly = false;
-            settled &= still == pairs;
-            pairs = still;
+            settled &= twins.part(&outgoing);
             if settled && std::mem::take(&mut choose) {
                 for (k, (negative, out)) in negative.iter_mut().zip(&outgoing).enumerate() {
-                    let own = known[k].is_none() && pairs[k].is_none();
+                    let own = known[k].is_none() && twins.of(k).is_none();
                     *negative = own && matches!(out, Expr::Node { neg: true, .. });
                 }
                 settled = !negative.contains(&true);
@@ -197,18 +180,21 @@ impl<'g, 'a> Link<'g, 'a> {
                 }
                 let outgoing = outgoing.into_iter().zip(&negative).map(|(e, negative)| signed(e, *negative)).collect();
                 let end = self.graph.len();
-                let mut incoming = symbols_of(&incoming);
-                for k in 0..first.len() {
-                    match known[k] {
-                        Some(_) => pairs[k] = None,
-                        None if pairs[k].is_some() => incoming[k] = Expr::zero(),
-                        None => {}
-                    }
-                }
-                self.passes.push(LinkPass { incoming, twins: pairs, outgoing, negative, end });
+                // What is a constant has no twin, and what has one no symbol.
+                let variable = |(twin, known): (Option<Twin>, &Option<f64>)| twin.filter(|_| known.is_none());
+                let twins: Vec<_> = twins.places().into_iter().zip(&known).map(variable).collect();
+                let own = |(symbol, twin): (_, &Option<Twin>)| if twin.is_some() { Expr::zero() } else { symbol };
+                let incoming = symbols_of(&incoming).into_iter().zip(&twins).map(own).collect();
+                self.passes.push(LinkPass { incoming, twins, outgoing, negative, end });
                 return;
             }
         }
+    }
+
+    /// A symbol for what is carried into pass number `number` at place `k`.
+    fn symbol(&mut self, number: usize, k: usize) -> Expr<'g> {
+        self.inputs.push(LinkInput::Carried(number, k));
+        self.graph.input(self.inputs.len() - 1)
     }
 
     fn turn(
@@ -248,15 +234,15 @@ impl<'g, 'a> Link<'g, 'a> {
     pub fn pass_of_branch(&mut self, pass: usize, direction: SweepDirection, from_parent: &[Expr<'_>]) {
         let number = self.passes.len();
         self.stage.begin(pass, &self.given);
+        let symbols = from_parent.iter().enumerate().map(|(k, first)| match (*first, self.symbol(number, k)) {
+            (Expr::Const(x), _) => Expr::Const(x),
+            (Expr::Node { .. }, symbol) => symbol,
+        });
+        let incoming: Vec<Expr<'g>> = symbols.collect();
+        let mut outgoing = Vec::new();
         let (given, outer) = (&self.given, self.nodes);
-        let (mut incoming, mut outgoing) = (Vec::new(), Vec::new());
         match direction {
             SweepDirection::BaseToTip => {
-                for (k, first) in from_parent.iter().enumerate() {
-                    self.inputs.push(LinkInput::Carried(number, k));
-                    let symbol = self.graph.input(self.inputs.len() - 1);
-                    incoming.push(if let Expr::Const(x) = *first { Expr::Const(x) } else { symbol });
-                }
                 let mut next = incoming.iter();
                 let mut next = || *next.next().expect("a pass takes in as much as the parent hands on");
                 self.stage.carried(pass, 0, given, |e| *e = next());

@@ -3,6 +3,7 @@
 use super::link::Link;
 use super::pass_state::{read, PassState};
 use super::runs::Run;
+use super::twins::{signed, value};
 use super::SweepDirection;
 use crate::output::InputArray;
 use crate::symbolic::{Expr, Graph, Op};
@@ -134,12 +135,8 @@ impl<'m> MainLine<'m, '_> {
                 }
             })
             .collect();
-        let signed = |out: Expr<'m>, negative: bool| if negative { -out } else { out };
         let own = |k: usize| signed(end[k], negative[k]);
-        let mut out = twins.iter().enumerate().map(|(k, twin)| match twin {
-            Some(twin) => signed(own(twin.place), twin.opposite),
-            None => own(k),
-        });
+        let mut out = twins.iter().enumerate().map(|(k, twin)| value(*twin, k, own));
         let mut next = || out.next().expect("a pass hands on as much as it takes in");
         match direction {
             SweepDirection::TipToBase => stage.carried(pass, to, given, |e| *e = *e + next()),
@@ -208,11 +205,7 @@ impl<'m> MainLine<'m, '_> {
                     self.next_input += 1;
                     self.graph.input(self.next_input - 1)
                 });
-                if *negative {
-                    -end
-                } else {
-                    end
-                }
+                signed(end, *negative)
             });
             handed.push(shares.collect());
         }
