@@ -178,7 +178,8 @@ def rollout(
 
     Returns a `Rollout` of ``q`` ``(B, T + 1, nq)``, ``v`` ``(B, T + 1, nv)``, without ``B`` for a single start, the list of
     failures (`SimulationError` with ``row`` and ``time``), that of events (`Crossing`, `ContactEvent`) and the forces
-    ``(B, T + 1, C, 3)``, NaN where contacts were followed by time steps, which have impulses. States after a terminal event are NaN.
+    ``(B, T + 1, C, 3)``: those of time steps are means over the last one, in which impacts have a part, and zero before the first.
+    States after a terminal event are NaN.
     The lock of the interpreter is released meanwhile.
     """
     if on_error not in ("raise", "mark"):

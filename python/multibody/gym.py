@@ -15,12 +15,14 @@ __all__ = ["State", "make", "make_vec"]
 
 
 class State(NamedTuple):
-    """States after a step, row by row: coordinates ``(B, nq)``, velocities ``(B, nv)``, actions ``(B, nv)``, times ``(B,)`` in s."""
+    """States after a step, row by row: coordinates ``(B, nq)``, velocities ``(B, nv)``, actions ``(B, n)``, times ``(B,)`` in s,
+    and forces of contacts ``(B, C, 3)``, N, along their normals and two tangents."""
 
     q: np.ndarray
     v: np.ndarray
     action: np.ndarray
     time: np.ndarray
+    forces: np.ndarray
 
 
 Function = Callable[[State], np.ndarray]
@@ -53,15 +55,44 @@ class _Motion:
         action_limit: Any = None,
         params: Any = None,
         threads: Optional[int] = 1,
+        control: str = "efforts",
+        contacts: Optional[str] = None,
+        observe: Optional[Function] = None,
     ) -> None:
         self.model, self.reward, self.rows = model, reward, rows
         self.dt, self.frame_skip, self.method = dt, frame_skip, method
         self.max_episode_steps, self.terminated = max_episode_steps, terminated
         self.start, self.params, self.threads = reset or self.near_start, params, threads
-        limit = model.max_effort if action_limit is None else np.broadcast_to(action_limit, (model.nv,))
-        self.limit = np.where(np.isfinite(limit), limit, 1.0).astype(np.float64)
-        self.q, self.v = np.zeros((rows, model.nq)), np.zeros((rows, model.nv))
-        self.steps = np.zeros(rows, dtype=np.int64)
+        touches = len(model.contact_names) > 0
+        self.contacts = contacts or ("steps" if touches else "automatic")
+        self.axes, self.scale, self.low, self.high = self.actions(control, action_limit)
+        self.observe = observe or (lambda state: np.concatenate([state.q, state.v], axis=1))
+        self.touches, self.steps = touches, np.zeros(rows, dtype=np.int64)
+        zeros = lambda *shape: np.zeros((rows, *shape))  # noqa: E731
+        actions, forces = zeros(len(self.axes)), zeros(len(model.contact_names), 3)
+        self.state = State(zeros(model.nq), zeros(model.nv), actions, zeros(), forces)
+
+    def actions(self, control: str, limit: Any) -> Tuple[np.ndarray, ...]:
+        """Velocities on which actions act, efforts of an action of one, least and greatest actions."""
+        axes = self.model.axes
+        if control == "efforts":
+            scale = np.ones(len(axes))
+            high = np.where(np.isfinite(self.model.max_effort[axes]), self.model.max_effort[axes], 1.0)
+            low = -high
+        elif control == "targets":
+            axes = axes[self.model.kp[axes] > 0]
+            if not len(axes):
+                raise ValueError("control='targets' needs joints with gains: multibody.load(..., gains=(kp, kd))")
+            scale, ranges = self.model.kp[axes], self.model.joint_ranges[axes]
+            low, high = np.where(np.isfinite(ranges), ranges, [-np.pi, np.pi]).T
+        else:
+            raise ValueError(f"`control` is {control!r}: take 'efforts' or 'targets'")
+        if isinstance(limit, tuple):
+            low, high = limit
+        elif limit is not None:
+            low, high = -np.asarray(limit), limit
+        whole = [np.broadcast_to(np.asarray(end, dtype=np.float64), axes.shape) for end in (low, high)]
+        return axes, scale, whole[0], whole[1]
 
     def near_start(self, random: np.random.Generator, rows: int) -> Tuple[np.ndarray, np.ndarray]:
         """The model's start, closed, with small velocities."""
@@ -71,33 +102,38 @@ class _Motion:
 
     def reset(self, random: np.random.Generator, which: np.ndarray) -> None:
         q, v = self.start(random, int(which.sum()))
-        self.q[which], self.v[which], self.steps[which] = q, v, 0
+        self.state.q[which], self.state.v[which], self.steps[which] = q, v, 0
+        self.state.action[which], self.state.time[which], self.state.forces[which] = 0, 0, 0
 
     def observations(self) -> np.ndarray:
-        return np.concatenate([self.q, self.v], axis=1)
+        return np.asarray(self.observe(self.state), dtype=np.float64)
 
     def step(self, actions: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rewards, ends by the user's rule or by a failure, ends by time."""
-        actions = np.clip(np.asarray(actions, dtype=np.float64), -self.limit, self.limit)
-        u = np.broadcast_to(actions[:, None, :], (self.rows, self.frame_skip, self.model.nv))
+        actions = np.clip(np.asarray(actions, dtype=np.float64), self.low, self.high)
+        u = np.zeros((self.rows, 1, self.model.nv))
+        u[:, 0, self.axes] = self.scale * actions
         motion = self.model.rollout(
-            (self.q, self.v),
-            u,
+            (self.state.q, self.state.v),
+            np.broadcast_to(u, (self.rows, self.frame_skip, self.model.nv)),
             dt=self.dt,
             method=self.method,
             every=self.frame_skip,
             params=self.params,
+            contacts=self.contacts,
+            forces=self.touches,
             threads=self.threads,
             on_error="mark",
         )
         failed = np.isnan(motion.q[:, -1]).any(axis=1) | np.isnan(motion.v[:, -1]).any(axis=1)
         # A row that fails stays where it was and ends.
-        self.q = np.where(failed[:, None], self.q, motion.q[:, -1])
-        self.v = np.where(failed[:, None], self.v, motion.v[:, -1])
+        kept = lambda new, old: np.where(failed.reshape(-1, *(1,) * (old.ndim - 1)), old, new)  # noqa: E731
+        q, v = kept(motion.q[:, -1], self.state.q), kept(motion.v[:, -1], self.state.v)
+        forces = kept(motion.forces[:, -1], self.state.forces) if self.touches else self.state.forces
         self.steps += 1
-        state = State(self.q, self.v, actions, self.steps * self.dt * self.frame_skip)
-        rewards = np.broadcast_to(np.asarray(self.reward(state), dtype=np.float64), (self.rows,)).copy()
-        ends = failed if self.terminated is None else failed | np.asarray(self.terminated(state), dtype=bool)
+        self.state = State(q, v, actions, self.steps * self.dt * self.frame_skip, forces)
+        rewards = np.broadcast_to(np.asarray(self.reward(self.state), dtype=np.float64), (self.rows,)).copy()
+        ends = failed if self.terminated is None else failed | np.asarray(self.terminated(self.state), dtype=bool)
         return rewards, ends, self.steps >= self.max_episode_steps
 
 
@@ -129,12 +165,17 @@ def make(model: Any, reward: Function, **settings: Any) -> Any:
 def make_vec(model: Any, reward: Function, num_envs: int, **settings: Any) -> Any:
     """A vectorised environment (`gymnasium.vector.VectorEnv`) of ``num_envs`` states of one model.
 
-    Observations are ``[q, v]``, actions joint forces ``(nv,)``, N m or N, within the efforts of the model (1 where it states none)
-    or ``action_limit``. ``reward`` and ``terminated`` take a `State` and give one number, or truth, for each row. ``reset`` takes
-    a generator of random numbers and a number of rows, and gives coordinates and velocities. ``dt`` is the step of integration,
-    s, ``frame_skip`` the number of steps under one action, ``max_episode_steps`` the time limit (truncation), ``params`` the
-    parameters of every row, ``threads`` the number of threads. Rows that end are reset at the next step, whose action and
-    reward do not count (``AutoresetMode.NEXT_STEP``). A row whose motion fails is terminated.
+    ``control`` says what actions are: ``"efforts"``, joint forces, N m or N, within the efforts of the model (1 where it states
+    none), or ``"targets"``, positions of joints, rad or m, within their ranges (π where there are none), which a model that was
+    loaded with ``gains=`` follows. Both act on the axes ``model.axes`` alone (``"targets"`` on those with gains), and not on what is
+    free in space. ``action_limit`` is another bound, or a tuple of the least and the greatest action.
+
+    Observations are ``[q, v]``, or what ``observe`` gives. ``observe``, ``reward`` and ``terminated`` take a `State` of all rows and
+    give an array ``(B, n)``, one number, and truth for each row. ``reset`` takes a generator of random numbers and a number of
+    rows, and gives coordinates and velocities. ``dt`` is the step of integration, s, ``frame_skip`` the number of steps under one
+    action, ``max_episode_steps`` the time limit (truncation), ``params`` the parameters of every row, ``threads`` the number of
+    threads. Contacts are followed by time steps of ``dt``, or as ``contacts`` says (see `Model.rollout`). Rows that end are reset
+    at the next step, whose action and reward do not count (``AutoresetMode.NEXT_STEP``). A row whose motion fails is terminated.
     """
     gymnasium = _gymnasium()
     motion = _Motion(model, reward, num_envs, **settings)
@@ -176,6 +217,5 @@ def make_vec(model: Any, reward: Function, num_envs: int, **settings: Any) -> An
 
 
 def _spaces(gymnasium: Any, model: Any, motion: _Motion) -> Any:
-    n = model.nq + model.nv
-    observations = gymnasium.spaces.Box(-np.inf, np.inf, (n,), dtype=np.float64)
-    return observations, gymnasium.spaces.Box(-motion.limit, motion.limit, dtype=np.float64)
+    box = gymnasium.spaces.Box
+    return box(-np.inf, np.inf, motion.observations().shape[1:], dtype=np.float64), box(motion.low, motion.high, dtype=np.float64)

@@ -1,4 +1,4 @@
-from typing import Any, Callable, List, NamedTuple, Optional, Tuple
+from typing import Any, Callable, List, Literal, NamedTuple, Optional, Tuple, Union
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,7 @@ class State(NamedTuple):
     v: _Array
     action: _Array
     time: _Array
+    forces: _Array
 
 def make(
     model: Model,
@@ -25,9 +26,12 @@ def make(
     max_episode_steps: int = ...,
     terminated: Optional[Callable[[State], ArrayLike]] = ...,
     reset: Optional[Callable[[np.random.Generator, int], Tuple[ArrayLike, ArrayLike]]] = ...,
-    action_limit: Optional[ArrayLike] = ...,
+    action_limit: Union[ArrayLike, Tuple[ArrayLike, ArrayLike], None] = ...,
     params: Any = ...,
     threads: Optional[int] = ...,
+    control: Literal["efforts", "targets"] = ...,
+    contacts: Optional[Literal["automatic", "events", "steps"]] = ...,
+    observe: Optional[Callable[[State], ArrayLike]] = ...,
 ) -> Any: ...
 def make_vec(
     model: Model,
@@ -40,7 +44,10 @@ def make_vec(
     max_episode_steps: int = ...,
     terminated: Optional[Callable[[State], ArrayLike]] = ...,
     reset: Optional[Callable[[np.random.Generator, int], Tuple[ArrayLike, ArrayLike]]] = ...,
-    action_limit: Optional[ArrayLike] = ...,
+    action_limit: Union[ArrayLike, Tuple[ArrayLike, ArrayLike], None] = ...,
     params: Any = ...,
     threads: Optional[int] = ...,
+    control: Literal["efforts", "targets"] = ...,
+    contacts: Optional[Literal["automatic", "events", "steps"]] = ...,
+    observe: Optional[Callable[[State], ArrayLike]] = ...,
 ) -> Any: ...

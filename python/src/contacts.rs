@@ -7,7 +7,7 @@ use multibody::codegen::plan::Plan;
 use multibody::codegen::Options;
 use multibody::runtime::constrained::{Effort, Projection, Stabilisation, WithPostStep};
 use multibody::runtime::contact::{
-    Contact, ContactMotion, HybridError, ModeTable, RegimeChoice, RegimeRules, WithContacts,
+    Contact, ContactMotion, HybridError, ModeTable, Regime, RegimeChoice, RegimeRules, WithContacts,
 };
 use multibody::runtime::integrate::{AutoSwitch, Dop853, Radau5, Rk4, Step, StepError, Stepper, Tolerances};
 
@@ -170,7 +170,12 @@ impl Motion<'_> {
             if step.is_multiple_of(self.settings.every) {
                 let at = *written;
                 let (q, v) = (&mut q[at * nq..(at + 1) * nq], &mut v[at * nv..(at + 1) * nv]);
-                kept.forces(system, motion.regime(), t, &state);
+                kept.forces(|| match motion.regime() {
+                    // Of a copy: nothing of the motion depends on whether forces are asked for.
+                    Regime::Events => system.clone().forces(t, &state.q, &state.p).to_vec(),
+                    // Zero before the first step.
+                    Regime::TimeSteps => motion.steps.mean_forces(),
+                });
                 self.store(system.system_mut(), t, &mut state, q, v);
                 *written += 1;
             }

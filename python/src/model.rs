@@ -1,10 +1,11 @@
 //! The class `Model`.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use multibody::codegen::jit::CompileError;
-use multibody::codegen::model::Model as Description;
+use multibody::codegen::model::{Contact, Model as Description};
 use multibody::codegen::options::{Arithmetic, PlanOptions};
 use multibody::codegen::plan::Plan;
 use multibody::codegen::{Options, Output};
@@ -28,6 +29,8 @@ use crate::{evaluate, generate, read, rollout, settings, told};
 pub struct Model {
     pub(crate) description: Description,
     findings: Py<PyList>,
+    /// Gains of position control of every joint.
+    gains: Vec<(f64, f64)>,
     /// Names and places in the state; without a search.
     pub(crate) plan: Plan,
     options: Options,
@@ -51,6 +54,13 @@ impl Model {
                 out[v..v + joint.kind.nv()].fill(of(joint).unwrap_or(none));
             }
         }
+        out
+    }
+
+    /// Numbers of the axes, one for each velocity; zero for those that are of no axis.
+    fn of_axes(&self, of: impl Fn(usize) -> f64) -> Vec<f64> {
+        let mut out = vec![0.0; self.plan.dims.nv];
+        self.plan.axes().for_each(|axis| out[axis.v] = of(axis.joint));
         out
     }
 }
@@ -144,8 +154,15 @@ impl Model {
     /// Ranges of the joints, `(nv, 2)`, rad or m: infinite where there are none.
     #[getter]
     fn joint_ranges<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let low = self.bounds(|joint| joint.bounds.range.map(|range| range[0]), f64::NEG_INFINITY);
-        let high = self.bounds(|joint| joint.bounds.range.map(|range| range[1]), f64::INFINITY);
+        let mut low = self.bounds(|joint| joint.bounds.range.map(|range| range[0]), f64::NEG_INFINITY);
+        let mut high = self.bounds(|joint| joint.bounds.range.map(|range| range[1]), f64::INFINITY);
+        let stops = self.description.contacts.iter().filter_map(Contact::stop);
+        for (joint, below, at) in stops {
+            for axis in self.plan.axes().filter(|axis| axis.joint == joint) {
+                let end = if below { &mut low[axis.v] } else { &mut high[axis.v] };
+                *end = if below { end.max(at) } else { end.min(at) };
+            }
+        }
         let both: Vec<f64> = low.into_iter().zip(high).flat_map(|(low, high)| [low, high]).collect();
         PyArray1::from_vec(py, both).reshape([self.plan.dims.nv, 2])
     }
@@ -160,6 +177,24 @@ impl Model {
     #[getter]
     fn max_effort<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         PyArray1::from_vec(py, self.plan.effort_limits())
+    }
+
+    /// Indices of the velocities that motors could drive, `(n,)`: all but those of planar, spherical and floating joints.
+    #[getter]
+    fn axes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<usize>> {
+        PyArray1::from_iter(py, self.plan.axes().map(|axis| axis.v))
+    }
+
+    /// Stiffness of position control, `(nv,)`, N m/rad or N/m: `u = model.kp * targets` holds joints at targets.
+    #[getter]
+    fn kp<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.of_axes(|joint| self.gains[joint].0))
+    }
+
+    /// Damping of position control, `(nv,)`, N m s/rad or N s/m: `u = model.kd * rates` adds the rates of targets.
+    #[getter]
+    fn kd<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_vec(py, self.of_axes(|joint| self.gains[joint].1))
     }
 
     /// The neutral configuration, `(nq,)`: zeros and unit quaternions.
@@ -275,7 +310,7 @@ impl Model {
 /// Reads a model.
 #[pyfunction]
 #[pyo3(signature = (path = None, *, text = None, format = "toml", base = "fixed", gravity = None, limits = false, floor = None,
-    variant = None, wrenches = Vec::new(), arithmetic = "fast", search = true))]
+    variant = None, wrenches = Vec::new(), gains = None, arithmetic = "fast", search = true))]
 pub fn load(
     py: Python<'_>,
     path: Option<PathBuf>,
@@ -287,16 +322,31 @@ pub fn load(
     floor: Option<(f64, f64)>,
     variant: Option<String>,
     wrenches: Vec<String>,
+    gains: Option<GivenGains>,
     arithmetic: &str,
     search: bool,
 ) -> PyResult<Model> {
     let read::Source { file, text } = read::source(path, text, format)?;
-    let reading = (base.to_string(), gravity, limits, floor, variant, wrenches);
+    let gains = match gains {
+        None => Default::default(),
+        Some(GivenGains::All(gains)) => (Default::default(), Some(gains)),
+        Some(GivenGains::Named(gains)) => (gains, None),
+    };
+    let reading = (base.to_string(), gravity, limits, floor, variant, wrenches, gains);
     restore(py, (file, text, reading, (arithmetic.to_string(), search), Default::default()))
 }
 
+/// Gains of position control as a caller gives them.
+#[derive(FromPyObject)]
+pub enum GivenGains {
+    /// Of all joints.
+    All((f64, f64)),
+    /// By the names of joints.
+    Named(BTreeMap<String, (f64, f64)>),
+}
+
 /// Settings of [`load`] about the description.
-type Reading = (String, Option<[f64; 3]>, bool, Option<(f64, f64)>, Option<String>, Vec<String>);
+type Reading = (String, Option<[f64; 3]>, bool, Option<(f64, f64)>, Option<String>, Vec<String>, read::Gains);
 
 /// All that a model is made of: the name of its file, its text, settings of reading and of computing, other files.
 pub type Recipe = (String, String, Reading, (String, bool), read::Files);
@@ -304,19 +354,22 @@ pub type Recipe = (String, String, Reading, (String, bool), read::Files);
 /// Makes a model of its recipe, on another machine as well.
 #[pyfunction(name = "_restore")]
 pub fn restore(py: Python<'_>, mut recipe: Recipe) -> PyResult<Model> {
-    let (file, text, (base, gravity, limits, floor, variant, wrenches), (arithmetic, search), files) = &mut recipe;
+    let (file, text, (base, gravity, limits, floor, variant, wrenches, gains), (arithmetic, search), files) =
+        &mut recipe;
     let source = read::Source { file: file.clone(), text: text.clone() };
     let import = read::options(base, *gravity, *limits, *floor)?;
     let Some(arithmetic) = Arithmetic::from_name(arithmetic) else {
         let names = Arithmetic::ALL.map(Arithmetic::name).join(", ");
         return Err(PyValueError::new_err(format!("no arithmetic is called `{arithmetic}`: take one of {names}")));
     };
-    let (description, found) = read::model(py, &source, &import, variant.as_deref(), wrenches, files)?;
+    let (mut description, found) = read::model(py, &source, &import, variant.as_deref(), wrenches, files)?;
+    let gains = read::add_gains(py, &mut description, gains)?;
     let plan = if *search { PlanOptions::default() } else { PlanOptions::quick() };
     let options = Options { arithmetic, plan, ..Options::default() };
     Ok(Model {
         plan: py.detach(|| Plan::new(&description, plan.snap)),
         findings: findings(py, &found.0)?.unbind(),
+        gains,
         description,
         options,
         recipe,

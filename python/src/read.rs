@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use multibody::codegen::diag::Diagnostics;
-use multibody::codegen::model::{Model, Wrench, WrenchAxes};
+use multibody::codegen::model::{Joint, JointMotion, Model, Wrench, WrenchAxes};
 use multibody::codegen::read::{self, Base, Floor, ImportOptions};
 use multibody::codegen::words;
 use pyo3::exceptions::PyValueError;
@@ -87,6 +87,39 @@ pub fn model(
         model.wrenches.push(Wrench { name: name.clone(), body, axes: WrenchAxes::Body });
     }
     Ok((model, found))
+}
+
+/// Gains of position control by the names of joints, and those of all other joints with axes; N m/rad or N/m, and N m s/rad or
+/// N s/m.
+pub type Gains = (BTreeMap<String, (f64, f64)>, Option<(f64, f64)>);
+
+/// Gives joints springs and dampers with these gains. Returns the gains of every joint.
+pub fn add_gains(py: Python<'_>, model: &mut Model, (named, all): &Gains) -> PyResult<Vec<(f64, f64)>> {
+    let moves = |joint: &Joint| joint.motion == JointMotion::Free && joint.kind.nv() > 0;
+    let takes = |joint: &&Joint| moves(joint) && joint.kind.spec().group.is_none();
+    for name in named.keys() {
+        let names = model.joints.iter().filter(takes).map(|joint| joint.name.as_str());
+        if !names.clone().any(|known| known == name) {
+            let help =
+                words::did_you_mean(name, names.clone(), || format!("position control moves {}", words::list(names)));
+            let words = format!("gains: no joint that position control can move is named {}", words::quote(name));
+            return Err(about_model(py, &format!("{words}: {help}")));
+        }
+    }
+    let of = |joint: &Joint| takes(&joint).then(|| named.get(&joint.name).copied().or(*all)).flatten();
+    let gains: Vec<(f64, f64)> = model.joints.iter().map(|joint| of(joint).unwrap_or_default()).collect();
+    for (joint, (kp, kd)) in model.joints.iter_mut().zip(&gains) {
+        let sound = |gain: f64| gain >= 0.0 && gain.is_finite();
+        if !(sound(*kp) && sound(*kd)) {
+            let words = format!("`gains` of {} are {kp} and {kd}: give numbers from 0 on", words::quote(&joint.name));
+            return Err(PyValueError::new_err(words));
+        }
+        if (*kp, *kd) != (0.0, 0.0) && joint.add_gains(*kp, *kd).is_none() {
+            let of = "has a spring or a damper that is a parameter, to which none can be added";
+            return Err(about_model(py, &format!("gains: {} {of}", words::quote(&joint.name))));
+        }
+    }
+    Ok(gains)
 }
 
 /// All findings about a description.

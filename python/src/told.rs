@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use multibody::codegen::jit::Compiled;
 use multibody::codegen::plan::Plan;
-use multibody::runtime::contact::{ContactEvent, ContactObserver, Mode, ModeTable, Regime, WithContacts};
+use multibody::runtime::contact::{ContactEvent, ContactObserver, Mode, ModeTable, WithContacts};
 use multibody::runtime::integrate::{Direction, Events, Watch};
 use numpy::PyArray1;
 use pyo3::exceptions::PyValueError;
@@ -139,13 +139,10 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// Keeps the forces of a state. In time steps there are impulses only, and what is kept is not a number.
-    pub fn forces(&mut self, system: &WithContacts<ModeTable<Compiled>>, regime: Regime, t: f64, state: &State) {
-        let Some(kept) = &mut self.forces else { return };
-        match regime {
-            // Of a copy: nothing of the motion depends on whether forces are asked for.
-            Regime::Events => kept.extend(system.clone().forces(t, &state.q, &state.p)),
-            Regime::TimeSteps => kept.extend(system.modes().iter().map(|_| [f64::NAN; 3])),
+    /// Keeps the forces of a state.
+    pub fn forces(&mut self, forces: impl FnOnce() -> Vec<[f64; 3]>) {
+        if let Some(kept) = &mut self.forces {
+            kept.extend(forces());
         }
     }
 }

@@ -117,3 +117,39 @@ def test_vectors_of_environments():
     single = multibody.gym.make(pendulum, **settings)
     single.reset(seed=1)
     assert single.step(np.ones(2))[0].shape == (4,)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_environments_with_contacts():
+    """A quadruped that is held at the positions of its joints stays up on its feet, which carry its weight."""
+    pytest.importorskip("gymnasium")
+    from gymnasium.utils.env_checker import check_env
+
+    dog = multibody.load(MODELS / "contacts" / "quadruped.toml", gains=(20.0, 0.5), search=False)
+    stand = dog.start()[0][7:]
+    settings = dict(
+        reward=lambda state: state.forces[:, :4, 0].sum(axis=1),
+        terminated=lambda state: state.q[:, 2] < 0.1,
+        observe=lambda state: np.concatenate([state.q[:, 2:], state.v, state.forces[:, :4, 0] > 0], axis=1),
+        control="targets",
+        dt=2e-3,
+        frame_skip=10,
+    )
+    check_env(multibody.gym.make(dog, **settings), skip_render_check=True)
+    envs = multibody.gym.make_vec(dog, num_envs=3, **settings)
+    first, _ = envs.reset(seed=1)
+    assert first.shape == (3, 17 + 18 + 4) and envs.single_action_space.shape == (12,)
+    assert (envs.single_action_space.low[2::3] == [-2.6, -2.6, 0.1, 0.1]).all()
+    for _ in range(75):
+        observations, rewards, terminated, truncated, _ = envs.step(np.tile(stand, (3, 1)))
+        assert not terminated.any() and not truncated.any()
+    weight = 9.81 * dog.mass_matrix(dog.neutral())[0, 0]
+    assert (observations[:, -4:] == 1).all() and abs(rewards - weight).max() < 1e-2 * weight
+    # The same with its motors off: it falls.
+    slack = multibody.load(MODELS / "contacts" / "quadruped.toml", search=False)
+    envs = multibody.gym.make_vec(slack, num_envs=1, **(settings | {"control": "efforts"}))
+    envs.reset(seed=1)
+    assert envs.single_action_space.shape == (12,)
+    assert any(envs.step(np.zeros((1, 12)))[2].any() for _ in range(75))
+    with pytest.raises(ValueError, match="gains"):
+        multibody.gym.make(slack, **settings)

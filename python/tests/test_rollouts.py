@@ -1,6 +1,7 @@
 """Rollouts: order, bits, layouts, failures, interrupts."""
 
 import os
+import pickle
 import signal
 import threading
 import time
@@ -10,6 +11,32 @@ import pytest
 from conftest import MODELS, states
 
 import multibody
+
+
+def test_gains_are_a_controller(arm):
+    """Springs and dampers with the joint forces `kp q*` are a PD controller, and travel with the model."""
+    gains = {name: (400.0 / (k + 1), 40.0 / (k + 1)) for k, name in enumerate(arm.velocity_names) if "wrist" not in name}
+    held = multibody.load(MODELS / "ur5.urdf", gains=gains)
+    assert (held.kp > 0).sum() == 3 and (held.kd[held.kp > 0] == held.kp[held.kp > 0] / 10).all()
+    (q, v), targets = states(arm, 20), states(arm, 20, seed=1)[0]
+    wanted = arm.accelerations(q, v, tau=held.kp * (targets - q) - held.kd * v)
+    copy = pickle.loads(pickle.dumps(held))
+    assert (copy.kp == held.kp).all()
+    for model in (held, copy):
+        np.testing.assert_allclose(model.accelerations(q, v, tau=held.kp * targets), wanted, rtol=1e-9, atol=1e-9)
+    # A spring that was there goes on to pull to where it did.
+    text = (MODELS / "contacts" / "quadruped_hop.toml").read_text()
+    dog, stiffer = multibody.load(text=text, search=False), multibody.load(text=text, search=False, gains=(2.0, 0.1))
+    q, v = states(dog, 20)
+    extra = stiffer.kp * (0 - np.insert(q[:, 7:], [0] * 6, 0, axis=1)) - stiffer.kd * v
+    wanted = dog.accelerations(q, v, tau=extra)
+    np.testing.assert_allclose(stiffer.accelerations(q, v), wanted, rtol=1e-9, atol=1e-6)
+    # What is free in space has no axes.
+    assert (dog.axes == np.arange(6, 18)).all() and (stiffer.kp[:6] == 0).all()
+    with pytest.raises(multibody.ModelError, match="did you mean"):
+        multibody.load(MODELS / "ur5.urdf", gains={"elbow_join": (1.0, 1.0)})
+    with pytest.raises(ValueError, match="from 0 on"):
+        multibody.load(MODELS / "ur5.urdf", gains=(-1.0, 1.0))
 
 
 def test_energy_error_falls_with_the_fourth_power(arm):
@@ -162,6 +189,16 @@ def test_contacts_are_followed():
     q[1, 2] = -1.0
     below = ball.rollout((q, v), dt=5e-3, steps=2, tolerance=1e-9, on_error="mark")
     assert [(failure.row, failure.kind) for failure in below.failures] == [(1, "overlap")]
+    # Time steps begin with what other time steps may have left, events do not.
+    q[0, 2], q[1, 2] = ball.start()[0][2] - 1 - 1e-4, ball.start()[0][2] - 1 - 2e-3
+    for contacts, failing in (("events", [0, 1]), ("automatic", [1]), ("steps", [1])):
+        inside = ball.rollout((q, 0 * v), dt=5e-3, steps=2, on_error="mark", contacts=contacts)
+        assert [(failure.row, failure.kind) for failure in inside.failures] == [(row, "overlap") for row in failing]
+
+
+def sum_of_masses(model):
+    """Of a floating robot."""
+    return model.mass_matrix(model.neutral())[0, 0]
 
 
 def test_contacts_by_time_steps():
@@ -175,7 +212,12 @@ def test_contacts_by_time_steps():
         steps = round(0.2 / dt)
         motion = dog.rollout((q, v), dt=dt, steps=steps, contacts="steps", threads=1, forces=True)
         errors.append(abs(motion.q[:, -1] - wanted).max())
-        assert np.isnan(motion.forces).all()
+        # Mean forces of the steps carry the weight and change the momentum: but for what the explicit midpoint rule errs by.
+        ends = [np.einsum("bij,bj->bi", dog.centroidal(motion.q[:, k], motion.v[:, k]).matrix, motion.v[:, k])[:, 2] for k in (0, -1)]
+        weight = 9.81 * sum_of_masses(dog)
+        pushed = dt * (motion.forces[:, 1:, :4, 0].sum(axis=(1, 2)) - weight * steps)
+        assert (motion.forces[:, 0] == 0).all() and motion.forces[:, 1:, :4, 0].max() > weight
+        assert abs(ends[1] - ends[0] - pushed).max() < 100 * dt**2 * weight
     # Of the first order, irregularly: steps meet a landing sooner or later. Feet move at some 2 m/s and land four times: a step
     # of 4 ms errs by less than four times 2 m/s in one of its lengths, and shorter ones by less and less.
     assert errors[0] < 4 * 2.0 * 4e-3 and errors[1] < 0.5 * errors[0] and errors[2] < 0.5 * errors[1]

@@ -121,6 +121,9 @@ def test_forces_of_contacts_carry_the_weight(ball):
     motion = rough.rollout((q, v), dt=1e-2, steps=10, forces=True, events=True)
     assert motion.forces.shape == (11, 1, 3) and motion.events == []
     np.testing.assert_allclose(motion.forces[:, 0], np.tile([0.2 * G, 0, 0], (11, 1)), atol=1e-9)
+    stepped = rough.rollout((q, v), dt=1e-2, steps=10, forces=True, contacts="steps")
+    assert (stepped.forces[0] == 0).all()
+    np.testing.assert_allclose(stepped.forces[1:, 0], np.tile([0.2 * G, 0, 0], (10, 1)), atol=1e-9)
     above = rough.rollout((q + [0, 0, 1, 0, 0, 0, 0], v), dt=1e-2, steps=10, every=5, forces=True)
     assert above.forces.shape == (3, 1, 3) and (above.forces == 0).all()
 

@@ -10,9 +10,8 @@ use std::path::Path;
 use std::rc::Rc;
 
 use multibody::codegen::jit::Compiled;
-use multibody::codegen::plan::Plan;
+use multibody::codegen::plan::{JointAxis, Plan};
 use multibody::codegen::words::{did_you_mean, list, quote};
-use multibody::runtime::tree::Source;
 use multibody::runtime::StateDerivatives;
 
 use super::args::{ControlArgs, Gain, Interpolation};
@@ -69,18 +68,9 @@ struct Work {
     demand: Vec<f64>,
 }
 
-/// The axes of a plan: freedoms of joints whose coordinates are numbers with the velocities as their rates.
-fn axes(plan: &Plan, q: &[f64]) -> Vec<Axis> {
-    let mut axes = Vec::new();
-    for slot in &plan.slots {
-        let Some(Source::State { q: first, v }) = slot.at else { continue };
-        let spec = plan.model.joints[slot.joint].kind.spec();
-        if spec.group.is_none() {
-            let axis = |k| Axis { q: first + k, v: v + k, gains: [0.0; 2], rest: q[first + k] };
-            axes.extend((0..spec.freedoms.len()).map(axis));
-        }
-    }
-    axes
+/// The axes of a plan, without gains.
+fn axes(plan: &Plan, start: &[f64]) -> Vec<Axis> {
+    plan.axes().map(|JointAxis { q, v, .. }| Axis { q, v, gains: [0.0; 2], rest: start[q] }).collect()
 }
 
 /// Names of columns: with the letter of a quantity, as the tables of `mbd simulate` have them, and without it.

@@ -30,6 +30,21 @@ pub struct Contact {
     pub origin: Origin,
 }
 
+impl Contact {
+    /// Index of the joint that this stop stops, whether it does so from below, and the coordinate there, rad or m; `None` for
+    /// what is no stop.
+    pub fn stop(&self) -> Option<(usize, bool, f64)> {
+        match &self.kind {
+            ConstraintKind::Coupling { terms, offset } if self.shapes.is_none() => {
+                let [(joint, ratio)] = terms[..] else { return None };
+                let (ratio, offset) = (ratio.constant()?, offset.constant()?);
+                Some((joint, ratio > 0.0, ratio * offset))
+            }
+            _ => None,
+        }
+    }
+}
+
 /// Kinds of shapes, in the shape's own axes, with its origin in their middle.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ShapeKind {

@@ -456,6 +456,21 @@ impl Joint {
             origin: Origin::default(),
         }
     }
+
+    /// Adds a spring of `kp` N m/rad or N/m that pulls to zero, and a damper of `kd` N m s/rad or N s/m, to each freedom, as
+    /// position control does: with the joint force `kp q*`, the joint is held at `q*` with the gains of a PD controller.
+    /// `None`, and nothing is changed, where its springs or dampers are run-time parameters.
+    pub fn add_gains(&mut self, kp: f64, kd: f64) -> Option<()> {
+        let constants = |values: &[Value]| values.iter().map(|value| value.constant()).collect::<Option<Vec<f64>>>();
+        let (stiffness, rest) = (constants(&self.stiffness)?, constants(&self.rest)?);
+        let damping = constants(&self.damping)?;
+        self.damping = damping.iter().map(|d| Value::Const(d + kd)).collect();
+        self.stiffness = stiffness.iter().map(|k| Value::Const(k + kp)).collect();
+        // A spring that is there goes on to pull to its own rest position.
+        let both = stiffness.iter().zip(&rest).map(|(k, rest)| if k + kp > 0.0 { k * rest / (k + kp) } else { *rest });
+        self.rest = both.map(Value::Const).collect();
+        Some(())
+    }
 }
 
 #[cfg(test)]

@@ -21,4 +21,4 @@ pub use chain::ChainElimination;
 pub use paths::{chains, has_rows, parallel_runs};
 pub(crate) use paths::{is_single_but_for_rows, touches_rolled, unbranched_paths};
 pub use rigid::Rigid;
-pub use structure::{Plan, PlanBond, PlanConstraint, PlanFrame, PlanNode, PoseStep, RowsThatAct, Slot};
+pub use structure::{JointAxis, Plan, PlanBond, PlanConstraint, PlanFrame, PlanNode, PoseStep, RowsThatAct, Slot};

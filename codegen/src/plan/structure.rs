@@ -193,6 +193,17 @@ pub struct PlanConstraint {
     pub decay: Value,
 }
 
+/// A freedom of a joint whose coordinate is a number with the velocity as its rate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct JointAxis {
+    /// Index into the joints of the model.
+    pub joint: usize,
+    /// Index into the coordinates.
+    pub q: usize,
+    /// Index into the velocities, momenta and joint forces.
+    pub v: usize,
+}
+
 impl Plan {
     /// Run-time parameters.
     pub fn params(&self) -> &[Param] {
@@ -217,6 +228,22 @@ impl Plan {
     /// Names of the velocities (momenta, joint forces), in state order.
     pub fn velocity_names(&self) -> Vec<String> {
         self.state_names(|spec| spec.freedoms.iter().map(|f| f.name).collect())
+    }
+
+    /// The axes, in state order: freedoms of joints whose coordinates are numbers with the velocities as their rates, which
+    /// are all but those of `spherical`, `planar` and `floating` joints. Where a robot has motors, they move axes.
+    pub fn axes(&self) -> impl Iterator<Item = JointAxis> + '_ {
+        self.slots.iter().flat_map(|slot| {
+            let spec = self.model.joints[slot.joint].kind.spec();
+            let first = match slot.at {
+                Some(Source::State { q, v }) if spec.group.is_none() => Some((q, v)),
+                _ => None,
+            };
+            let freedoms = spec.freedoms.len();
+            first
+                .into_iter()
+                .flat_map(move |(q, v)| (0..freedoms).map(move |k| JointAxis { joint: slot.joint, q: q + k, v: v + k }))
+        })
     }
 
     /// Largest effort of every velocity that the description allows, N m or N; infinite where it states none.

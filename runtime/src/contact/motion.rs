@@ -9,6 +9,10 @@ use crate::integrate::{Statistics, Step, Stepper};
 use crate::system::Real;
 use crate::Scalar;
 
+/// Overlap with which a motion begins that may take time steps, m (rad for stops of rotations): another motion by time steps may
+/// have left it, where bodies were fast.
+const OVERLAP: f64 = 1e-3;
+
 /// How a motion with contacts is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Regime {
@@ -136,7 +140,8 @@ where
     /// At time `t` (s) and a state, with steps `step` of the method between events.
     ///
     /// What touches at the start is resolved as in a motion by events. Where that fails, a motion that may choose begins by
-    /// time steps, as one by time steps always does.
+    /// time steps, as one by time steps always does, and where bodies overlap by more than motion by events begins with, but no
+    /// more than 1 mm (or mrad).
     ///
     /// # Errors
     /// [`HybridError`].
@@ -152,11 +157,12 @@ where
             return Err(StepError::StepTooSmall { time: t.to_f64(), step: rules.step, error: 0.0 }.into());
         }
         let steps = TimeStepping::new(system, post_step);
-        let mut events = Hybrid::unsettled(system, method, step, t, (q, p))?;
+        let overlap = if rules.choice == RegimeChoice::Events { 0.0 } else { OVERLAP };
+        let mut events = Hybrid::unsettled(system, method, step, t, (q, p), overlap)?;
         let settled = match rules.choice {
             RegimeChoice::TimeSteps => false,
             RegimeChoice::Events => events.settle_modes(system, t, None).map(|()| true)?,
-            RegimeChoice::Automatic => events.settle_modes(system, t, None).is_ok(),
+            RegimeChoice::Automatic => !events.overlaps(system) && events.settle_modes(system, t, None).is_ok(),
         };
         let inner = system.system();
         let (kept, modes) = (inner.zero_momenta(), inner.per_contact(Mode::Open));

@@ -156,12 +156,13 @@ where
         q: &Y::Coordinates,
         p: &Y::Momenta,
     ) -> Result<Self, HybridError> {
-        let mut hybrid = Hybrid::unsettled(system, method, step, t, (q, p))?;
+        let mut hybrid = Hybrid::unsettled(system, method, step, t, (q, p), 0.0)?;
         hybrid.settle_modes(system, t, None)?;
         Ok(hybrid)
     }
 
-    /// [`Hybrid::new`], but with all contacts open.
+    /// [`Hybrid::new`], but with all contacts open, and with overlaps as large as `overlap`, m (rad for stops of rotations), if
+    /// that is more than motion by events begins with.
     ///
     /// # Errors
     /// [`HybridError::Step`], [`HybridError::Overlap`].
@@ -171,6 +172,7 @@ where
         step: Step,
         t: Y::Scalar,
         (q, p): (&Y::Coordinates, &Y::Momenta),
+        overlap: f64,
     ) -> Result<Self, HybridError> {
         let zero = Y::Scalar::zero();
         let solver = Solver::new(system, method, step, t, q, p)?;
@@ -205,8 +207,18 @@ where
             crowd: Crowd::at(t),
             statistics: ContactStatistics::default(),
         };
-        hybrid.place(system, t, q, p)?;
+        hybrid.place(system, t, (q, p), overlap)?;
         Ok(hybrid)
+    }
+
+    /// Overlap with which motion by events begins, m (rad for stops of rotations).
+    fn overlap(&self) -> f64 {
+        100.0 * self.rules.touching
+    }
+
+    /// Whether bodies overlap by more than motion by events begins with, where the system was looked at last.
+    pub(in crate::contact) fn overlaps(&self, system: &WithContacts<Y>) -> bool {
+        (0..self.count(system)).any(|k| system.gap(k).to_f64() < -self.overlap())
     }
 
     /// Starts again from another state, with all contacts that do not touch there open.
@@ -220,7 +232,7 @@ where
         q: &Y::Coordinates,
         p: &Y::Momenta,
     ) -> Result<(), HybridError> {
-        self.place(system, t, q, p)?;
+        self.place(system, t, (q, p), 0.0)?;
         self.settle_modes(system, t, None)
     }
 
@@ -236,7 +248,7 @@ where
         self.settle_modes(system, t, None)
     }
 
-    /// Takes a state, with all contacts open.
+    /// Takes a state, with all contacts open; bodies may overlap by `overlap`, or by as much as motion by events begins with.
     ///
     /// # Errors
     /// [`HybridError::Overlap`].
@@ -244,8 +256,8 @@ where
         &mut self,
         system: &mut WithContacts<Y>,
         t: Y::Scalar,
-        q: &Y::Coordinates,
-        p: &Y::Momenta,
+        (q, p): (&Y::Coordinates, &Y::Momenta),
+        overlap: f64,
     ) -> Result<(), HybridError> {
         system.open_all();
         self.q.as_mut().copy_from_slice(q.as_ref());
@@ -253,7 +265,7 @@ where
         system.look(t, &self.q, &self.p);
         for k in 0..self.count(system) {
             let gap = system.gap(k).to_f64();
-            if gap < -100.0 * self.rules.touching {
+            if gap < -overlap.max(self.overlap()) {
                 return Err(HybridError::Overlap { contact: k, gap });
             }
         }

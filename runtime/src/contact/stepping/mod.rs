@@ -67,8 +67,9 @@ pub struct TimeStepping<Y: Touching, B, I = ByRules> {
     /// Whether any contact has restitution; velocities of the rows at the start of the step then.
     pub(super) bounces: bool,
     pub(super) before: Y::Rows,
-    /// Impulses of each contact in the last step.
+    /// Impulses of each contact in the last step, or the last part of one that was divided, and its length, s.
     last_impulses: Y::PerContact<[Y::Scalar; 3]>,
+    impulse_time: Y::Scalar,
     /// Velocities with which coordinates go on.
     pub(super) v: Y::Momenta,
     /// Whether springs and dampers of the joints are taken implicitly in this step.
@@ -124,6 +125,7 @@ where
             bounces: false,
             before: inner.zero_rows(),
             last_impulses: inner.per_contact([Y::Scalar::zero(); 3]),
+            impulse_time: Y::Scalar::zero(),
             v: inner.zero_momenta(),
             implicit: false,
             pressed: [inner.per_contact(false), inner.per_contact(false)],
@@ -144,6 +146,17 @@ where
     /// Whether each contact had an impulse in the last step.
     pub fn pressed(&self) -> &[bool] {
         self.pressed[0].as_ref()
+    }
+
+    /// Mean forces of the contacts `[normal, tangential, tangential]` in the last step, N (N m for stops of rotations), on the
+    /// second body: its impulses over its length, of which those of an impact are a part. Of a step that was divided, they are
+    /// those of its last part. Zero before the first step.
+    pub fn mean_forces(&self) -> Y::PerContact<[Y::Scalar; 3]> {
+        let mut forces = self.last_impulses.clone();
+        if self.impulse_time > Y::Scalar::zero() {
+            forces.as_mut().as_flattened_mut().iter_mut().for_each(|force| *force = *force / self.impulse_time);
+        }
+        forces
     }
 
     /// The last step, which ended in a state: what is between its ends, to first order.
@@ -225,7 +238,7 @@ where
             let closed = self.post_step.close(system, t + h, false, &mut self.q, &mut self.p);
             closed.map_err(|error| StepError::Constraint { time: t.to_f64(), error })?;
         }
-        self.span = [t, t + h];
+        (self.span, self.impulse_time) = ([t, t + h], h);
         copy(self.last.0.as_mut(), q.as_ref());
         copy(self.last.1.as_mut(), p.as_ref());
         copy(q.as_mut(), self.q.as_ref());
