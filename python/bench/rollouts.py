@@ -96,6 +96,31 @@ def outputs(model, repeats):
         print(f"  accelerations of {rows} states: {best / rows * 1e9:.0f} ns a state")
 
 
+def loads(repeats):
+    """Steps a second of a UR5 that carries another load in each row: a parameter here, a model of its own in MuJoCo."""
+    text = bare_urdf("ur5.urdf")
+    head, tail = multibody.convert(text=text, format="urdf").split('name = "wrist_3_link"\nmass = ')
+    mass, tail = tail.split("\n", 1)
+    given = f'{head}name = "wrist_3_link"\nmass = {{ param = "load" }}\n{tail}\n[params]\nload = {mass}\n'
+    model, random = multibody.load(text=given), np.random.default_rng(0)
+    q = random.uniform(-1, 1, (ROWS, model.nv))
+    u, masses = random.uniform(-1, 1, (ROWS, STEPS, model.nv)), random.uniform(0.1, 2.0, ROWS)
+    others = [mujoco_model(text) for _ in range(ROWS)]
+    for other, load in zip(others, masses):
+        other.body("wrist_3_link").mass = load
+        mujoco.mj_setConst(other, mujoco.MjData(other))
+    places = np.argsort(order(model, others[0]))
+    start, forces, data = start_of(model, others[0], q), np.ascontiguousarray(u[:, :, places]), mujoco.MjData(others[0])
+    mine = lambda: model.rollout((q, np.zeros_like(q)), u, dt=DT, threads=1, params={"load": masses})  # noqa: E731
+    with mujoco_rollout.Rollout(nthread=0) as theirs:
+        work = lambda: theirs.rollout(others, [data], start, forces)  # noqa: E731
+        apart = abs(work()[0][:, -1, 1 : 1 + model.nv] - mine().q[:, -1][:, places]).max()
+        best = [min(seconds(way) for _ in range(repeats)) for way in (mine, work)]
+    rates = [ROWS * STEPS / time / 1e3 for time in best]
+    print(f"ur5.urdf with a load in each row; both motions differ by {apart:.1e} after {STEPS * DT:.1f} s")
+    print(f"  batch {rates[0]:.1f}, MuJoCo rollout {rates[1]:.1f} thousand steps a second: {rates[0] / rates[1]:.1f} times")
+
+
 def compare(name, repeats):
     """Steps a second of one robot, and how far both programs' motions are apart."""
     text = bare_urdf(name)
@@ -153,5 +178,7 @@ def compare(name, repeats):
 
 
 if __name__ == "__main__":
+    rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 10
     for robot in ("ur5.urdf", "g1.urdf"):
-        compare(robot, int(sys.argv[1]) if len(sys.argv) > 1 else 10)
+        compare(robot, rounds)
+    loads(rounds)

@@ -196,6 +196,16 @@ def test_contacts_are_followed():
         assert [(failure.row, failure.kind) for failure in inside.failures] == [(row, "overlap") for row in failing]
 
 
+def test_legs_creep_with_the_square_of_the_step():
+    dog = multibody.load(MODELS / "contacts" / "quadruped.toml", gains=(20.0, 0.5), search=False)
+    sinks = []
+    for dt in (2e-3, 1e-3):
+        u = np.tile(dog.kp * np.insert(dog.start()[0][7:], [0] * 6, 0), (round(1.5 / dt), 1))
+        height = dog.rollout(dog.start(), u, dt=dt, contacts="steps").q[:, 2]
+        sinks.append((height[round(1.35 / dt)] - height[-1]) / 0.15)
+    assert 3 < sinks[0] / sinks[1] < 5 and 0 < sinks[1] < 1e-6, sinks
+
+
 def sum_of_masses(model):
     """Of a floating robot."""
     return model.mass_matrix(model.neutral())[0, 0]

@@ -155,8 +155,8 @@ fn random_f32(count: usize, seed: u64) {
 
 #[test]
 fn random_points() {
-    random_f64(20_000, 1);
-    random_f32(20_000, 2);
+    random_f64(10_000, 1);
+    random_f32(10_000, 2);
 }
 
 #[test]

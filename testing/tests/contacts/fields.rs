@@ -56,7 +56,7 @@ fn gaps_are_distances_where_bodies_touch_and_rows_their_rates() {
         let mut scene = Scene::new(first, &[0.0; 14], &[0.0; 12]);
         let mut swapped = Scene::new(second, &[0.0; 14], &[0.0; 12]);
         let mut rng = Rng::new(k as u64, 12);
-        for _ in 0..60 {
+        for _ in 0..30 {
             // Also beside the grid, which ends at 1.65 m and 1.6 m.
             let (x, y) = (rng.around(2.5), rng.around(2.5));
             let mut q = [random_pose(&mut rng, 0.5), random_pose(&mut rng, 0.5)].concat();

@@ -10,6 +10,7 @@ mod hulls;
 mod jams;
 mod known;
 mod models;
+mod pendulums;
 mod round;
 mod saltation;
 mod scene;
