@@ -111,11 +111,16 @@ def loads(repeats):
         mujoco.mj_setConst(other, mujoco.MjData(other))
     places = np.argsort(order(model, others[0]))
     start, forces, data = start_of(model, others[0], q), np.ascontiguousarray(u[:, :, places]), mujoco.MjData(others[0])
-    mine = lambda: model.rollout((q, np.zeros_like(q)), u, dt=DT, threads=1, params={"load": masses})  # noqa: E731
-    with mujoco_rollout.Rollout(nthread=0) as theirs:
-        work = lambda: theirs.rollout(others, [data], start, forces)  # noqa: E731
-        apart = abs(work()[0][:, -1, 1 : 1 + model.nv] - mine().q[:, -1][:, places]).max()
-        best = [min(seconds(way) for _ in range(repeats)) for way in (mine, work)]
+    with mujoco_rollout.Rollout(nthread=0) as pool:
+
+        def mine():
+            return model.rollout((q, np.zeros_like(q)), u, dt=DT, threads=1, params={"load": masses})
+
+        def theirs():
+            return pool.rollout(others, [data], start, forces)
+
+        apart = abs(theirs()[0][:, -1, 1 : 1 + model.nv] - mine().q[:, -1][:, places]).max()
+        best = [min(seconds(way) for _ in range(repeats)) for way in (mine, theirs)]
     rates = [ROWS * STEPS / time / 1e3 for time in best]
     print(f"ur5.urdf with a load in each row; both motions differ by {apart:.1e} after {STEPS * DT:.1f} s")
     print(f"  batch {rates[0]:.1f}, MuJoCo rollout {rates[1]:.1f} thousand steps a second: {rates[0] / rates[1]:.1f} times")

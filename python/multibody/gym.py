@@ -68,9 +68,8 @@ class _Motion:
         self.axes, self.scale, self.low, self.high = self.actions(control, action_limit)
         self.observe = observe or (lambda state: np.concatenate([state.q, state.v], axis=1))
         self.touches, self.steps = touches, np.zeros(rows, dtype=np.int64)
-        zeros = lambda *shape: np.zeros((rows, *shape))  # noqa: E731
-        actions, forces = zeros(len(self.axes)), zeros(len(model.contact_names), 3)
-        self.state = State(zeros(model.nq), zeros(model.nv), actions, zeros(), forces)
+        shapes = [(model.nq,), (model.nv,), self.axes.shape, (), (len(model.contact_names), 3)]
+        self.state = State(*(np.zeros((rows, *shape)) for shape in shapes))
 
     def actions(self, control: str, limit: Any) -> Tuple[np.ndarray, ...]:
         """Velocities on which actions act, efforts of an action of one, least and greatest actions."""
@@ -127,9 +126,11 @@ class _Motion:
         )
         failed = np.isnan(motion.q[:, -1]).any(axis=1) | np.isnan(motion.v[:, -1]).any(axis=1)
         # A row that fails stays where it was and ends.
-        kept = lambda new, old: np.where(failed.reshape(-1, *(1,) * (old.ndim - 1)), old, new)  # noqa: E731
-        q, v = kept(motion.q[:, -1], self.state.q), kept(motion.v[:, -1], self.state.v)
-        forces = kept(motion.forces[:, -1], self.state.forces) if self.touches else self.state.forces
+        q = np.where(failed[:, None], self.state.q, motion.q[:, -1])
+        v = np.where(failed[:, None], self.state.v, motion.v[:, -1])
+        forces = self.state.forces
+        if self.touches:
+            forces = np.where(failed[:, None, None], forces, motion.forces[:, -1])
         self.steps += 1
         self.state = State(q, v, actions, self.steps * self.dt * self.frame_skip, forces)
         rewards = np.broadcast_to(np.asarray(self.reward(self.state), dtype=np.float64), (self.rows,)).copy()

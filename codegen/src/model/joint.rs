@@ -477,6 +477,20 @@ impl Joint {
 mod tests {
     use super::*;
 
+    #[test]
+    fn gains_add_to_springs_and_dampers() {
+        let kind = JointKind::Revolute { axis: Z };
+        let mut joint = Joint::new("hinge", kind, None, 0, Placement::IDENTITY);
+        (joint.stiffness, joint.rest) = (vec![Value::Const(3.0)], vec![Value::Const(0.5)]);
+        assert_eq!(joint.add_gains(1.0, 0.25), Some(()));
+        // The torque 3 (0.5 - q) - q of both is 4 (0.375 - q).
+        let [stiffness, rest, damping] = [&joint.stiffness, &joint.rest, &joint.damping].map(|all| all[0]);
+        assert_eq!([stiffness, rest, damping], [4.0, 0.375, 0.25].map(Value::Const));
+        joint.rest = vec![Value::Param(0)];
+        let before = joint.clone();
+        assert_eq!((joint.add_gains(1.0, 0.25), &joint), (None, &before));
+    }
+
     /// Each kind once.
     fn kinds() -> impl Iterator<Item = JointKind> {
         JOINTS.iter().map(|spec| (spec.make)([X, Y], Value::ZERO))
