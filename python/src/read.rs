@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use multibody::codegen::diag::Diagnostics;
-use multibody::codegen::model::{Joint, JointMotion, Model, Wrench, WrenchAxes};
+use multibody::codegen::model::{Joint, Model, Wrench, WrenchAxes};
 use multibody::codegen::read::{self, Base, Floor, ImportOptions};
 use multibody::codegen::words;
 use pyo3::exceptions::PyValueError;
@@ -95,8 +95,7 @@ pub type Gains = (BTreeMap<String, (f64, f64)>, Option<(f64, f64)>);
 
 /// Gives joints springs and dampers with these gains. Returns the gains of every joint.
 pub fn add_gains(py: Python<'_>, model: &mut Model, (named, all): &Gains) -> PyResult<Vec<(f64, f64)>> {
-    let moves = |joint: &Joint| joint.motion == JointMotion::Free && joint.kind.nv() > 0;
-    let takes = |joint: &&Joint| moves(joint) && joint.kind.spec().group.is_none();
+    let takes = |joint: &&Joint| joint.has_axes() && joint.kind.nv() > 0;
     for name in named.keys() {
         let names = model.joints.iter().filter(takes).map(|joint| joint.name.as_str());
         if !names.clone().any(|known| known == name) {

@@ -457,6 +457,12 @@ impl Joint {
         }
     }
 
+    /// Whether its freedoms are axes, which motors could drive: free ones, whose coordinates are numbers with the velocities as
+    /// their rates. Those of `spherical`, `planar` and `floating` joints are not.
+    pub fn has_axes(&self) -> bool {
+        self.motion == JointMotion::Free && self.kind.spec().group.is_none()
+    }
+
     /// Adds a spring of `kp` N m/rad or N/m that pulls to zero, and a damper of `kd` N m s/rad or N s/m, to each freedom, as
     /// position control does: with the joint force `kp q*`, the joint is held at `q*` with the gains of a PD controller.
     /// `None`, and nothing is changed, where its springs or dampers are run-time parameters.

@@ -193,7 +193,7 @@ pub struct PlanConstraint {
     pub decay: Value,
 }
 
-/// A freedom of a joint whose coordinate is a number with the velocity as its rate.
+/// A freedom of a joint that a motor could drive: its coordinate is a number with the velocity as its rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JointAxis {
     /// Index into the joints of the model.
@@ -230,19 +230,16 @@ impl Plan {
         self.state_names(|spec| spec.freedoms.iter().map(|f| f.name).collect())
     }
 
-    /// The axes, in state order: freedoms of joints whose coordinates are numbers with the velocities as their rates, which
-    /// are all but those of `spherical`, `planar` and `floating` joints. Where a robot has motors, they move axes.
+    /// The axes, in state order: freedoms of the joints that have some ([`Joint::has_axes`](crate::model::Joint::has_axes)).
     pub fn axes(&self) -> impl Iterator<Item = JointAxis> + '_ {
         self.slots.iter().flat_map(|slot| {
-            let spec = self.model.joints[slot.joint].kind.spec();
+            let joint = &self.model.joints[slot.joint];
             let first = match slot.at {
-                Some(Source::State { q, v }) if spec.group.is_none() => Some((q, v)),
+                Some(Source::State { q, v }) if joint.has_axes() => Some((q, v)),
                 _ => None,
             };
-            let freedoms = spec.freedoms.len();
-            first
-                .into_iter()
-                .flat_map(move |(q, v)| (0..freedoms).map(move |k| JointAxis { joint: slot.joint, q: q + k, v: v + k }))
+            let axis = move |(q, v), k| JointAxis { joint: slot.joint, q: q + k, v: v + k };
+            first.into_iter().flat_map(move |first| (0..joint.kind.nv()).map(move |k| axis(first, k)))
         })
     }
 
