@@ -99,7 +99,7 @@ fn summary(path: &Path, name: &str, model: &Model, out: &mut dyn Write) -> Outco
         d.nv,
         (mass * 1e9).round() / 1e9,
     );
-    let stops = model.contacts.iter().filter(|c| c.shapes.is_none()).count();
+    let stops = model.contacts.iter().filter(|c| c.stop().is_some()).count();
     let follows = plan.slots.iter().filter(|s| s.at.is_none()).count();
     // Elements that the model does not have are not mentioned.
     let counted = [

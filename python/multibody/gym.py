@@ -72,7 +72,7 @@ class _Motion:
         self.state = State(*(np.zeros((rows, *shape)) for shape in shapes))
 
     def actions(self, control: str, limit: Any) -> Tuple[np.ndarray, ...]:
-        """Velocities on which actions act, efforts of an action of one, least and greatest actions."""
+        """Velocities on which actions act, the efforts of actions of 1 (N m or N), least and greatest actions."""
         axes = self.model.axes
         if control == "efforts":
             scale = np.ones(len(axes))
@@ -91,6 +91,8 @@ class _Motion:
         elif limit is not None:
             low, high = -np.asarray(limit), limit
         whole = [np.broadcast_to(np.asarray(end, dtype=np.float64), axes.shape) for end in (low, high)]
+        if (whole[0] > whole[1]).any() or (len(axes) and (whole[0] == whole[1]).all()):
+            raise ValueError(f"`action_limit` is {limit!r}: give a bound from 0 on, or a tuple of the least and the greatest action")
         return axes, scale, whole[0], whole[1]
 
     def near_start(self, random: np.random.Generator, rows: int) -> Tuple[np.ndarray, np.ndarray]:

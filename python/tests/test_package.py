@@ -114,6 +114,9 @@ def test_vectors_of_environments():
         assert not terminated.any() and (truncated == (k == 2)).all() and (rewards < 0).all()
     observations, rewards, terminated, truncated, _ = envs.step(actions)
     assert (rewards == 0).all() and not truncated.any() and abs(observations).max() <= 0.011
+    for wrong in (-1.0, (2.0, 2.0), (1.0, -1.0)):
+        with pytest.raises(ValueError, match="action_limit"):
+            multibody.gym.make(pendulum, **{**settings, "action_limit": wrong})
     single = multibody.gym.make(pendulum, **settings)
     single.reset(seed=1)
     assert single.step(np.ones(2))[0].shape == (4,)
