@@ -63,6 +63,11 @@ impl<Y: System> PostStep<Y> for () {
     ) -> Result<(), ConstraintError> {
         Ok(())
     }
+
+    #[inline]
+    fn idle(&mut self, _system: &Y, _t: Y::Scalar) -> bool {
+        true
+    }
 }
 
 /// A method `M` with a [`PostStep`] `B` at the end of every step.

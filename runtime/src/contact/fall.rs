@@ -46,7 +46,7 @@ where
         copy(self.q.as_mut(), q.as_ref());
         self.implicit = system.system.steps_implicitly(h);
         self.bounces = system.system().contacts().iter().any(|c| c.restitution > Y::Scalar::zero());
-        if system.has_loops() || self.bounces {
+        if system.has_loops() || self.bounces && system.minds_any() {
             system.look(t, q, p);
             copy(self.before.as_mut(), system.at.velocities.as_ref());
             copy(self.p.as_mut(), system.p.as_ref());

@@ -12,9 +12,6 @@ use crate::system::{
 };
 use crate::Scalar;
 
-/// Number of contacts up to which all gaps are computed at once: finding out which are far takes as long.
-const FEW: usize = 8;
-
 /// A mechanism whose rows can be taken out of its equations.
 pub trait Reducible: Constrained<Scalar: Real> + Energetic + Conjugate + Sized {
     /// The mechanism in which only some rows act, one entry of `acts` for each row. Its rows have the numbers that they
@@ -351,7 +348,7 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
     }
 
     fn sees_parts(&self) -> bool {
-        self.contacts.len() > FEW && self.full.sees_parts()
+        self.contacts.len() > super::FEW && self.full.sees_parts()
     }
 
     fn gaps_of(

@@ -385,7 +385,7 @@ where
     fn land(&mut self, system: &mut WithContacts<Y>) -> Result<(), HybridError> {
         let Self { events, steps, t, q, p, kept, modes, statistics, .. } = self;
         let (mut closed, mut any) = (0.0_f64, false);
-        system.look(*t, q, p);
+        system.look_at_all(*t, q, p);
         for (k, (mode, pressed)) in modes.as_mut().iter_mut().zip(steps.pressed()).enumerate() {
             let gap = system.gap(k);
             let closes = *pressed || gap < Y::Scalar::zero();

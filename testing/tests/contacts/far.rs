@@ -25,20 +25,20 @@ use super::scene::{closed_start, model, Scene};
 
 /// A mechanism that counts the sweeps over it.
 #[derive(Clone, Debug)]
-struct Counted {
+pub struct Counted {
     inner: Interpreter<f64>,
-    sweeps: Rc<Cell<u64>>,
+    pub sweeps: Rc<Cell<u64>>,
     /// Whether nothing is said of how fast gaps close.
-    silent: bool,
+    pub silent: bool,
     /// Whether all gaps are computed wherever some are asked for.
     whole: bool,
     /// Rows whose gaps were computed, and how often some were.
-    rows: Rc<Cell<u64>>,
+    pub rows: Rc<Cell<u64>>,
     looks: Rc<Cell<u64>>,
 }
 
 impl Counted {
-    fn new(inner: Interpreter<f64>) -> Self {
+    pub fn new(inner: Interpreter<f64>) -> Self {
         Counted { inner, sweeps: Rc::default(), silent: false, whole: false, rows: Rc::default(), looks: Rc::default() }
     }
 

@@ -2,6 +2,7 @@
 
 mod answers;
 mod boxes;
+mod crowds;
 mod cylinders;
 mod edges;
 mod far;

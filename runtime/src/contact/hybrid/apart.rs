@@ -2,7 +2,8 @@
 
 use super::watch::TURN;
 use super::Hybrid;
-use crate::contact::{Mode, Reach, Touching, WithContacts};
+use crate::contact::touching::travels;
+use crate::contact::{Mode, Touching, WithContacts};
 use crate::integrate::Stepper;
 use crate::lists::{copy, get, set};
 use crate::system::Real;
@@ -223,30 +224,6 @@ where
         }
         most
     }
-}
-
-/// By how much each gap can have changed, m (rad): for coordinates of the sizes `size` where the step began that have moved
-/// by up to `moved`.
-fn travels<S: Real>(reaches: &[Reach<S>], moved: &[S], size: &[S], out: &mut [S]) {
-    let zero = S::zero();
-    // Where nothing is known, everything may have happened.
-    out.fill(S::constant(f64::INFINITY));
-    let mut contact = usize::MAX;
-    let (mut way, mut angle, mut arm) = (zero, zero, zero);
-    for reach in reaches {
-        if reach.contact != contact {
-            set(out, contact, way + angle * arm);
-            contact = reach.contact;
-            (way, angle, arm) = (zero, zero, zero);
-        }
-        let moved = get(moved, reach.velocity);
-        way = way + reach.rate * moved;
-        angle = angle + reach.turn * moved;
-        if reach.slide != zero {
-            arm = arm + reach.slide * (get(size, reach.velocity) + moved);
-        }
-    }
-    set(out, contact, way + angle * arm);
 }
 
 impl<Y: Touching> WithContacts<Y> {

@@ -21,6 +21,7 @@
 //! The method is of order 1 at impacts and where slip ends, of order 2 in between. Impulses never add energy: their work is
 //! that of an impact with velocities that approach no slower. What friction holds does not move.
 
+mod far;
 mod impulses;
 mod statistics;
 
@@ -36,6 +37,7 @@ use crate::lists::{copy, first, first_mut, get, get_or, part, part_mut, set};
 use crate::system::Real;
 use crate::Scalar;
 use core::marker::PhantomData;
+use far::Far;
 use impulses::briefly;
 
 /// Overlap in the middle of a step that stays, m (rad for stops of rotations), and as a part of what the fastest gap changes by
@@ -76,8 +78,10 @@ pub struct TimeStepping<Y: Touching, B, I = ByRules> {
     pub(super) implicit: bool,
     /// Whether a contact had an impulse in the last step, and whether it has one in this step.
     pressed: [Y::PerContact<bool>; 2],
-    /// What the fastest gap changes by in this step, m (rad for stops of rotations).
+    /// What the fastest gap that closes changes by in this step, m (rad for stops of rotations).
     near: Y::Scalar,
+    /// Contacts that are not looked at.
+    far: Far<Y>,
     /// Times of the ends of the last step, s, and the state at its start.
     span: [Y::Scalar; 2],
     last: (Y::Coordinates, Y::Momenta),
@@ -130,6 +134,7 @@ where
             implicit: false,
             pressed: [inner.per_contact(false), inner.per_contact(false)],
             near: Y::Scalar::zero(),
+            far: Far::new(inner),
             span: [Y::Scalar::zero(); 2],
             last: (inner.neutral(), inner.zero_momenta()),
             touching: Touches::new(inner),
@@ -222,8 +227,10 @@ where
     ) -> Result<(), HybridError> {
         let half = Y::Scalar::constant(0.5) * h;
         self.fall(system, t, h, (q, p))?;
-        system.look(t + h, &self.q, &self.p);
-        self.take(system, half);
+        self.touching.count = 0;
+        if self.look_near(system, [t, h], (q, p)) {
+            self.take(system, h);
+        }
         self.pressed[1].as_mut().fill(false);
         if self.touching.count > 0 {
             self.collide(system, t + h)?;
@@ -233,8 +240,10 @@ where
             self.drift(system, t + h, half)?;
         } else {
             self.last_impulses.as_mut().fill([Y::Scalar::zero(); 3]);
+            self.point.clear();
         }
-        if !self.post_step.idle(system, t + h) {
+        let free = self.post_step.idle(system, t + h);
+        if !free {
             let closed = self.post_step.close(system, t + h, false, &mut self.q, &mut self.p);
             closed.map_err(|error| StepError::Constraint { time: t.to_f64(), error })?;
         }
@@ -243,30 +252,34 @@ where
         copy(self.last.1.as_mut(), p.as_ref());
         copy(q.as_mut(), self.q.as_ref());
         copy(p.as_mut(), self.p.as_ref());
+        self.far.end(q, free.then_some(&self.point.x));
         let [last, now] = &mut self.pressed;
         self.statistics.changes += u64::from(last.as_ref() != now.as_ref());
         copy(last.as_mut(), now.as_ref());
         Ok(())
     }
 
+    /// Whether contact `k` may bounce in the step, its gap in the middle, m or rad, and the rate at which it may close, m/s or
+    /// rad/s. It does not close at all before it bounces.
+    fn closes(&self, system: &WithContacts<Y>, k: usize, h: Y::Scalar) -> (bool, Y::Scalar, Y::Scalar) {
+        let (zero, rate, c) = (Y::Scalar::zero(), system.gap_rate(k), system.contact(k));
+        let gap = middle_gap(system, k, Y::Scalar::constant(0.5) * h);
+        let start = get(self.before.as_ref(), c.row);
+        // Forces alone change the rate of the gap by `rate − start` in a step.
+        let bounces = self.bounces && c.restitution > zero && start < (rate - start) + (rate - start);
+        (bounces, gap, if bounces || !(gap > zero) { zero } else { gap / h })
+    }
+
     /// Takes the contacts into the problem that would overlap at the end of the step, and those that impulses on others
     /// might close, with their velocities.
-    fn take(&mut self, system: &WithContacts<Y>, half: Y::Scalar) {
+    fn take(&mut self, system: &WithContacts<Y>, h: Y::Scalar) {
         let zero = Y::Scalar::zero();
-        let fastest = (0..system.modes().len()).fold(zero, |most, k| larger(most, system.gap_rate(k).abs()));
-        let near = half * (fastest + fastest);
-        self.near = near;
-        self.touching.count = 0;
         let mut at = 0;
-        for k in 0..system.modes().len() {
-            let (rate, c) = (system.gap_rate(k), system.contact(k));
-            let gap = middle_gap(system, k, half);
+        for k in (0..system.modes().len()).filter(|k| system.minds(*k)) {
+            let (c, rate, (bounces, gap, ahead)) = (system.contact(k), system.gap_rate(k), self.closes(system, k, h));
             self.statistics.overlap = larger(self.statistics.overlap, -gap);
-            let start = get(self.before.as_ref(), c.row);
-            // Forces alone change the rate of the gap by `rate − start` in a step.
-            let bounces = self.bounces && c.restitution > zero && start < (rate - start) + (rate - start);
-            let ahead = if bounces || !(gap > zero) { zero } else { gap / (half + half) };
-            if (bounces && gap > zero) || !(rate + ahead < zero || gap < near) {
+            let waits = bounces && gap > zero;
+            if waits || !(rate + ahead < zero || gap < self.near) {
                 continue;
             }
             self.touching.take(system, k);
@@ -419,7 +432,7 @@ where
         copy(stepping.p.as_mut(), from_p);
         copy(q.as_mut(), from_q);
         copy(p.as_mut(), from_p);
-        system.look(at, &stepping.q, &stepping.p);
+        system.free(at, &stepping.q, &stepping.p);
         copy(stepping.v.as_mut(), system.at.v.as_ref());
         // Where the state cannot be continued, that of the nearer end is the answer.
         if stepping.drift(system, at, t - at).is_ok() {

@@ -301,10 +301,20 @@ impl<Y: Touching> WithContacts<Y> {
         !self.minded.as_ref().contains(&false)
     }
 
+    /// Whether any contact is minded.
+    pub(super) fn minds_any(&self) -> bool {
+        self.minded.as_ref().contains(&true)
+    }
+
     /// Minds some contacts from now on, and those that are closed.
     pub(super) fn mind(&mut self, of: impl Fn(usize) -> bool) {
+        self.mind_if(|k, _| of(k));
+    }
+
+    /// [`WithContacts::mind`] by whether a contact was minded, too.
+    pub(super) fn mind_if(&mut self, mut of: impl FnMut(usize, bool) -> bool) {
         for k in 0..self.minded.as_ref().len() {
-            let minded = self.mode(k) != Mode::Open || of(k);
+            let minded = of(k, self.minds(k)) || self.mode(k) != Mode::Open;
             set(self.minded.as_mut(), k, minded);
         }
     }
