@@ -227,12 +227,12 @@ fn mechanisms_25_to_49() {
 
 #[test]
 fn code_of_some_rows() {
-    batch(0..100, Rows::Made);
+    batch(0..60, Rows::Made);
 }
 
 #[test]
 fn code_of_rows_that_act_by_numbers() {
-    batch(0..100, Rows::Input);
+    batch(0..60, Rows::Input);
 }
 
 /// Code of a mechanism with constraints has the outputs for constraints, by default and with all outputs; code of a
