@@ -305,6 +305,9 @@ impl Reducible for Evaluator {
     fn reaches(&self, contacts: &[Contact<f64>]) -> Vec<Reach<f64>> {
         self.interpreter.tree().reaches(contacts)
     }
+    fn trees(&self) -> Vec<usize> {
+        self.interpreter.tree().trees()
+    }
     fn with_implicit_springs(&self, step: f64) -> Option<ImplicitSprings<Self, Vec<f64>>> {
         let found = self.interpreter.with_implicit_springs(step)?;
         let code = self.code.implicit.get_or_init(|| Code::new(self.code.plan.with_implicit_springs())).clone();

@@ -192,6 +192,9 @@ impl Reducible for Driven {
     fn reaches(&self, contacts: &[Contact<f64>]) -> Vec<Reach<f64>> {
         self.inner.reaches(contacts)
     }
+    fn trees(&self) -> Vec<usize> {
+        self.inner.trees()
+    }
     fn gaps(
         &mut self,
         q: &Vec<f64>,

@@ -440,6 +440,10 @@ impl<S: Number> Reducible for Compiled<S> {
         self.interpreter.tree().reaches(contacts)
     }
 
+    fn trees(&self) -> Vec<usize> {
+        self.interpreter.tree().trees()
+    }
+
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
         if !self.run(Output::Gaps, [q, v, &[]], [gaps, velocities, entries]) {
             self.interpreter.gaps(q, v, gaps, velocities, entries);

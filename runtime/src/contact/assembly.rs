@@ -6,6 +6,8 @@ use crate::constrained::rows::row;
 use crate::lists::{copy, get, part, set};
 use crate::system::{Real, Row};
 use crate::Scalar;
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
 
 /// A force at a contact: of a row, or of the normal row of a contact that slides, together with its friction.
 #[derive(Clone, Copy, Debug)]
@@ -66,6 +68,23 @@ pub struct ColumnsOf<'a, 'b, S> {
     rows: &'a [Row],
     /// Columns of the entries.
     places: &'a [usize],
+    shared: Shared<'a>,
+}
+
+/// Which lines are solved for together: forces on trees that stand on the ground beside each other do not feel one another.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shared<'a> {
+    /// Of each line its column and the trees on which its force acts; empty where each has its own column.
+    pub lines: &'a [Solved],
+    /// The tree of each velocity.
+    pub trees: &'a [usize],
+}
+
+/// The column of a line among those of unit forces, and the trees on which its force acts.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Solved {
+    pub column: usize,
+    pub trees: [usize; 2],
 }
 
 /// Only tables of modes, which need `alloc`, call this.
@@ -77,21 +96,50 @@ impl<'b, S: Real> Columns<'b, S> {
         contacts: &'a [Contact<S>],
         rows: &'a [Row],
         places: &'a [usize],
+        shared: Shared<'a>,
     ) -> ColumnsOf<'a, 'b, S> {
-        ColumnsOf { columns: self, contacts, rows, places }
+        ColumnsOf { columns: self, contacts, rows, places, shared }
+    }
+
+    /// Gives each line the first column that no line before it has whose force acts on the same trees; contacts act on those in
+    /// `trees`. `solved` stays empty where each line has its own column.
+    pub(super) fn merge(&self, contacts: &[Contact<S>], trees: &[[usize; 2]], solved: &mut Vec<Solved>) {
+        solved.clear();
+        let (mut columns, mut count) = (0, 0);
+        for (i, &k) in self.of.contacts.iter().enumerate() {
+            let one = Forces { contacts: &[k], touches: self.of.touches.and_then(|touches| touches.get(i..)) };
+            let Some(own) = trees.get(k) else { return solved.clear() };
+            let meets = |other: &&Solved| own.iter().any(|tree| other.trees.contains(tree));
+            let first = solved.iter().filter(meets).map(|other| other.column + 1).max().unwrap_or(0);
+            let lines = lines(contacts, one).count();
+            solved.extend((first..first + lines).map(|column| Solved { column, trees: *own }));
+            (columns, count) = (columns.max(first + lines), count + lines);
+        }
+        if columns == count {
+            solved.clear();
+        }
     }
 }
 
 impl<S: Real> ColumnsOf<'_, '_, S> {
     /// Their number.
     pub fn count(&self) -> usize {
-        1 + lines(self.contacts, self.columns.of).count()
+        let apart = || lines(self.contacts, self.columns.of).count();
+        1 + self.shared.lines.iter().map(|line| line.column + 1).max().unwrap_or_else(apart)
     }
 
     /// Writes the momenta of `L` columns from column `i` on, side by side: `L` numbers for each velocity, zeros after the last.
     pub fn momenta<const L: usize>(&self, i: usize, p: &mut [S]) {
         p.fill(S::zero());
         let places = Places { rows: self.rows, columns: self.places, entries: self.columns.entries };
+        if !self.shared.lines.is_empty() {
+            for (line, solved) in lines(self.contacts, self.columns.of).zip(self.shared.lines) {
+                if let Some(lane) = (solved.column + 1).checked_sub(i).filter(|lane| *lane < L) {
+                    places.unit_force::<L>(line, lane, p);
+                }
+            }
+            return;
+        }
         // The first column is zero.
         for (line, lane) in lines(self.contacts, self.columns.of).skip(i.max(1) - 1).zip(usize::from(i == 0)..L) {
             places.unit_force::<L>(line, lane, p);
@@ -101,12 +149,15 @@ impl<S: Real> ColumnsOf<'_, '_, S> {
     /// Takes the velocities of `L` columns from column `i` on, which come side by side, after those of the first one; they are
     /// changed.
     pub fn take<const L: usize>(&mut self, i: usize, v: &mut [S]) {
-        let ColumnsOf { rows, places, contacts, columns: Columns { of, entries, a, own, rest } } = self;
+        let ColumnsOf { rows, places, contacts, shared, columns: Columns { of, entries, a, own, rest } } = self;
         let places = Places { rows, columns: places, entries };
         if i == 0 {
             for (rest, v) in rest.iter_mut().zip(v.chunks_exact(L)) {
                 *rest = get(v, 0);
             }
+        }
+        if !shared.lines.is_empty() {
+            return places.take_shared::<L>(i, *shared, lines(contacts, *of), (rest, v), (a, own));
         }
         let count = lines(contacts, *of).count();
         places.take_answers::<L>((i, count), lines(contacts, *of), (rest, v), (a, own));
@@ -168,6 +219,37 @@ impl<'a, S: Real> Places<'a, S> {
             let lane = (k + 1).wrapping_sub(i);
             if let (true, Some(own)) = (lane < L, own.get_mut(k)) {
                 *own = line.forces(S::one()).fold(S::zero(), |sum, (r, force)| sum + force * get(&along(r), lane));
+            }
+        }
+    }
+
+    /// [`Places::take_answers`] where lines share columns. A row feels of a line what goes through the trees on which it acts.
+    fn take_shared<const L: usize>(
+        self,
+        i: usize,
+        shared: Shared,
+        all: impl Iterator<Item = Line<S>>,
+        (rest, v): (&[S], &[S]),
+        (a, own): (&mut [S], &mut [S]),
+    ) {
+        let along = |r: usize, solved: &Solved, lane: usize| {
+            let felt =
+                self.row(r).filter(|(column, _)| shared.trees.get(**column).is_some_and(|t| solved.trees.contains(t)));
+            felt.fold(S::zero(), |sum, (column, entry)| {
+                sum + *entry * (get(v, *column * L + lane) - get(rest, *column))
+            })
+        };
+        let lane = |solved: &Solved| (solved.column + 1).checked_sub(i).filter(|lane| *lane < L);
+        let count = shared.lines.len();
+        for (k, ((line, to), a)) in all.zip(shared.lines).zip(a.chunks_exact_mut(count.max(1))).enumerate() {
+            for (a, solved) in a.iter_mut().zip(shared.lines) {
+                if let Some(lane) = lane(solved) {
+                    let meets = to.trees.iter().any(|tree| solved.trees.contains(tree));
+                    *a = if meets { along(line.row, solved, lane) } else { S::zero() };
+                }
+            }
+            if let (Some(lane), Some(own)) = (lane(to), own.get_mut(k)) {
+                *own = line.forces(S::one()).fold(S::zero(), |sum, (r, force)| sum + force * along(r, to, lane));
             }
         }
     }

@@ -4,7 +4,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::{Deref, DerefMut};
 
-use super::assembly::{Columns, ColumnsOf};
+use super::assembly::{Columns, ColumnsOf, Shared, Solved};
 use super::{rows_that_act, Contact, Mode, Reach, Touching, Way};
 use crate::interp::{ImplicitSprings, Interpreter};
 use crate::system::{
@@ -36,6 +36,12 @@ pub trait Reducible: Constrained<Scalar: Real> + Energetic + Conjugate + Sized {
         velocities: &mut Self::Rows,
         entries: &mut Self::Entries,
     );
+
+    /// The tree of each velocity, of those that stand on the ground beside each other.
+    /// Loops and couplings may join them. Empty where this is not known.
+    fn trees(&self) -> Vec<usize> {
+        Vec::new()
+    }
 
     /// Whether [`Reducible::gaps_of`] takes less than [`Reducible::gaps`] where few rows are asked for.
     fn sees_parts(&self) -> bool {
@@ -85,6 +91,10 @@ impl<S: Real> Reducible for Interpreter<S> {
         self.tree().reaches(contacts)
     }
 
+    fn trees(&self) -> Vec<usize> {
+        self.tree().trees()
+    }
+
     fn with_implicit_springs(&self, step: S) -> Option<ImplicitSprings<Self, Vec<S>>> {
         Interpreter::with_implicit_springs(self, step)
     }
@@ -122,6 +132,12 @@ pub struct ModeTable<Y: Constrained> {
     reaches: Vec<Reach<Y::Scalar>>,
     /// The rows of [`Touching::gaps_of`].
     wanted: Vec<bool>,
+    /// The tree of each velocity, those of each contact, and which rows of contacts are solved for together.
+    trees: Vec<usize>,
+    trees_of: Vec<[usize; 2]>,
+    solved: Vec<Solved>,
+    /// Memory for these.
+    spare: ([Y::Momenta; 2], Y::Rows),
     implicit: Option<Implicit<Y>>,
 }
 
@@ -146,8 +162,20 @@ impl<Y: Reducible> ModeTable<Y> {
         let open = vec![Mode::Open; contacts.len()];
         let first = full.acting(&rows_that_act(full.rows().len(), &contacts, &open));
         let (reaches, wanted) = (full.reaches(&contacts), vec![true; full.rows().len()]);
-        let current = 0;
-        ModeTable { full, modes: vec![(open, first)], current, contacts, reaches, wanted, implicit: None }
+        let trees = full.trees();
+        ModeTable {
+            modes: vec![(open, first)],
+            current: 0,
+            reaches,
+            wanted,
+            trees_of: trees_of(&full, &contacts, &trees),
+            trees,
+            solved: Vec::new(),
+            spare: ([full.zero_momenta(), full.zero_momenta()], full.zero_rows()),
+            contacts,
+            full,
+            implicit: None,
+        }
     }
 
     /// The sets of modes that were met, in the order in which they were.
@@ -375,10 +403,20 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
     }
 
     fn project_columns(&mut self, t: Y::Scalar, q: &Y::Coordinates, columns: &mut Columns<Y::Scalar>) -> bool {
-        let ModeTable { full, modes, current, contacts, .. } = self;
+        let ModeTable { full, modes, current, contacts, trees, trees_of, solved, spare, .. } = self;
         let (rows, entries) = (full.rows(), full.entry_columns());
-        let mut of = columns.of(contacts, rows, entries);
-        modes[*current].1.project_several(t, q, &mut of)
+        columns.merge(contacts, trees_of, solved);
+        let mut of = columns.of(contacts, rows, entries, Shared { lines: solved, trees });
+        let current = &mut modes[*current].1;
+        if current.project_several(t, q, &mut of) {
+            return true;
+        }
+        if solved.is_empty() {
+            return false;
+        }
+        let ([p, v], sigma) = spare;
+        one_by_one(&mut of, [p, v], |p, v| current.project_momenta(t, q, p, v, sigma));
+        true
     }
 
     fn steps_implicitly(&mut self, step: Y::Scalar) -> bool {
@@ -423,19 +461,53 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
     }
 
     fn project_columns_implicitly(&mut self, t: Y::Scalar, q: &Y::Coordinates, columns: &mut Columns<Y::Scalar>) {
-        let ModeTable { full, modes, current, contacts, implicit, .. } = self;
+        let ModeTable { full, modes, current, contacts, implicit, trees, trees_of, solved, .. } = self;
         let Some(Implicit { springs: Some(springs), rest: [p, v], sigma, .. }) = implicit else { return };
         let ImplicitSprings { evaluator, .. } = springs;
         let current = &mut modes[*current].1;
         evaluator.swap_inputs(current);
-        let mut of = columns.of(contacts, full.rows(), full.entry_columns());
+        columns.merge(contacts, trees_of, solved);
+        let mut of = columns.of(contacts, full.rows(), full.entry_columns(), Shared { lines: solved, trees });
         if !evaluator.project_several(t, q, &mut of) {
-            for i in 0..of.count() {
-                of.momenta::<1>(i, p.as_mut());
-                evaluator.project_momenta(t, q, p, v, sigma);
-                of.take::<1>(i, v.as_mut());
-            }
+            one_by_one(&mut of, [p, v], |p, v| evaluator.project_momenta(t, q, p, v, sigma));
         }
         evaluator.swap_inputs(current);
     }
+}
+
+/// Solves for momenta one after the other.
+fn one_by_one<S: Real, P: AsMut<[S]>>(
+    of: &mut ColumnsOf<S>,
+    [p, v]: [&mut P; 2],
+    mut solve: impl FnMut(&mut P, &mut P),
+) {
+    for i in 0..of.count() {
+        of.momenta::<1>(i, p.as_mut());
+        solve(p, v);
+        of.take::<1>(i, v.as_mut());
+    }
+}
+
+/// The trees on which the rows of each contact act: one tree twice where there is one. Empty where trees are not known, or where
+/// there is only one.
+fn trees_of<Y: Constrained>(full: &Y, contacts: &[Contact<Y::Scalar>], trees: &[usize]) -> Vec<[usize; 2]> {
+    // Loops and couplings act from tree to tree as well.
+    let loops = full.rows().len() > contacts.iter().map(Contact::rows).sum();
+    if loops || trees.iter().all(|tree| trees.first() == Some(tree)) {
+        return Vec::new();
+    }
+    let of = |contact: &Contact<Y::Scalar>| {
+        let rows = full.rows().get(contact.row..contact.row + contact.rows()).unwrap_or(&[]);
+        let columns =
+            rows.iter().flat_map(|row| full.entry_columns().get(row.first..row.first + row.len).unwrap_or(&[]));
+        let mut all: Vec<usize> = columns.filter_map(|column| trees.get(*column).copied()).collect();
+        all.sort_unstable();
+        all.dedup();
+        match all[..] {
+            [a] => Some([a, a]),
+            [a, b] => Some([a, b]),
+            _ => None,
+        }
+    };
+    contacts.iter().map(of).collect::<Option<_>>().unwrap_or_default()
 }

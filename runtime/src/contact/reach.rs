@@ -120,6 +120,25 @@ impl<S: Real> Tree<S> {
         all
     }
 
+    /// The tree of each velocity, of those that stand on the ground beside each other, which loops and couplings may
+    /// join; empty where one coordinate moves joints of several trees.
+    pub fn trees(&self) -> Vec<usize> {
+        let (mut root, mut trees) = (Vec::new(), vec![usize::MAX; self.dims.nv]);
+        for (i, node) in self.nodes.iter().enumerate() {
+            let own = node.parent.map_or(i, |parent| root[parent]);
+            root.push(own);
+            if let Source::State { v, .. } = node.source {
+                for tree in &mut trees[v..v + node.kind.nv()] {
+                    if *tree != usize::MAX && *tree != own {
+                        return Vec::new();
+                    }
+                    *tree = own;
+                }
+            }
+        }
+        trees
+    }
+
     fn reach_of_cut(&self, cut: &Cut<S>, table: &mut [[f64; 3]]) {
         let Some((first, second)) = radii(&cut.closure) else { return unbounded(table) };
         let to_surface = |frame: &TreeFrame<S>, radius: f64| offset(&frame.place) + radius;

@@ -28,7 +28,7 @@ use super::scene::{closed_start, model, Scene};
 pub struct Counted {
     inner: Interpreter<f64>,
     pub sweeps: Rc<Cell<u64>>,
-    /// Whether nothing is said of how fast gaps close.
+    /// Whether nothing is said of how fast gaps close, nor of trees that do not feel each other.
     pub silent: bool,
     /// Whether all gaps are computed wherever some are asked for.
     whole: bool,
@@ -126,6 +126,13 @@ impl Reducible for Counted {
         let mut reaches = Reducible::reaches(&self.inner, contacts);
         reaches.iter_mut().filter(|_| self.silent).for_each(|reach| reach.rate = f64::INFINITY);
         reaches
+    }
+    fn trees(&self) -> Vec<usize> {
+        if self.silent {
+            Vec::new()
+        } else {
+            Reducible::trees(&self.inner)
+        }
     }
     fn gaps(
         &mut self,
