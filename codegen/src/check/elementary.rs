@@ -344,6 +344,22 @@ mod tests {
     use super::*;
     use crate::model::Rotation;
 
+    /// A line crosses a body from side to side, or has an end inside, or passes beside it.
+    #[cfg(feature = "hulls")]
+    #[test]
+    fn lines_cross_faces() {
+        let size = [2.0, 2.0, 0.2];
+        let hull = ShapeKind::Hull { points: corners(size), rounding: 0.0 };
+        for shape in [ShapeKind::Box { size, rounding: 0.0 }, hull] {
+            let solid = Rounded::new(&shape).expect("faces");
+            for (x, wanted) in [(0.3, true), (0.9, true), (1.1, false)] {
+                assert_eq!(solid.is_crossed([[x, 0.2, -3.0], [x, 0.1, 3.0]]), wanted, "{shape:?} {x}");
+            }
+            assert!(solid.is_crossed([[0.3, 0.2, 0.0], [0.3, 0.2, 3.0]]));
+            assert!(!solid.is_crossed([[0.3, 0.2, 0.2], [0.3, 0.2, 3.0]]));
+        }
+    }
+
     /// A box has corners at the same distance from its middle; turned about z by a right angle, its x is the body's y.
     #[test]
     fn corners_stand_at_the_ends_of_the_edges() {

@@ -1,7 +1,7 @@
 //! Contacts between the bodies of a robot, which options ask for: which pairs of shapes become contacts.
 
 use mbd_codegen::model::Model;
-use mbd_codegen::read::{load, to_toml, Base, Floor, ImportOptions};
+use mbd_codegen::read::{load, load_with, to_toml, Base, Floor, ImportOptions};
 
 const SOLID: &str = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>";
 
@@ -222,4 +222,10 @@ fn neighbours_and_planes_of_mujoco() {
 fn a_base_takes_the_option() {
     let error = load("m.toml", "name = 'm'", &asked()).1.to_string();
     assert!(error.contains("a TOML model states its own limits and contacts"), "{error}");
+    let files = |_: &std::path::Path| Ok(robot().into_bytes());
+    // What a variant removes makes no contacts.
+    let text = "[base]\nfile = 'r.urdf'\n[[variant]]\nname = 'headless'\nremove = ['head']\n";
+    let (read, findings) = load_with("m.toml", text, &asked(), &files);
+    let (model, variants) = read.unwrap_or_else(|| panic!("{findings}"));
+    assert_eq!((named(&model).len(), named(&variants[0].model).len()), (10, 6), "{findings}");
 }
