@@ -75,6 +75,7 @@ def load(
     gravity: Optional[Sequence[float]] = ...,
     limits: bool = ...,
     floor: Optional[Tuple[float, float]] = ...,
+    self_contact: Optional[float] = ...,
     variant: Optional[str] = ...,
     wrenches: Sequence[str] = ...,
     gains: Union[Tuple[float, float], Mapping[str, Tuple[float, float]], None] = ...,
@@ -90,6 +91,7 @@ def check(
     gravity: Optional[Sequence[float]] = ...,
     limits: bool = ...,
     floor: Optional[Tuple[float, float]] = ...,
+    self_contact: Optional[float] = ...,
 ) -> List[Finding]: ...
 def convert(
     path: Optional[_Path] = ...,

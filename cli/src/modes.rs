@@ -37,7 +37,7 @@ pub fn run(args: &ModesArgs, out: &mut dyn Write) -> Outcome {
     if model.contacts.is_empty() {
         return Err(Failure::new(
             format!("`{}` has no contacts", model.name),
-            "add [[shape]] and [[contact]] to the model, or `limits` to a joint; of a URDF or MJCF model take --floor and --limits",
+            "add [[shape]] and [[contact]] to the model, or `limits` to a joint; of a URDF or MJCF model take --floor, --self-contact and --limits",
         ));
     }
     let settings = simulate::settings(&args.motion)?;

@@ -41,7 +41,7 @@ pub struct Variant {
 ///
 /// `file` names the source in the findings and in the origins of the model, and gives the model its name if the text
 /// does not. Of other files, only the `[base]` and the meshes that a TOML text names, the included files and meshes of an MJCF text, and,
-/// with a floor, the meshes of a URDF text are read, from their paths relative to the folder of `file`.
+/// with a floor or contacts between bodies, the meshes of a URDF text are read, from their paths relative to the folder of `file`.
 ///
 /// # Errors
 /// All findings at once, in the order of the text, where one of them is an error.
@@ -234,7 +234,8 @@ pub fn json_schema() -> String {
 /// come the warnings and notices about the source. A `[base]` is read by `files` and becomes part of the text.
 ///
 /// # Errors
-/// All findings where one of them is an error, and a floor in the options, which the TOML format describes by a shape.
+/// All findings where one of them is an error, and a floor or contacts between bodies in the options, which the TOML format describes
+/// by shapes and contacts.
 pub fn to_toml(
     file: &str,
     text: &str,
@@ -252,6 +253,12 @@ pub fn to_toml(
         return refused(
             "a floor of the options is not converted",
             "convert without it, and add a `plane` and contacts",
+        );
+    }
+    if options.self_contact.is_some() {
+        return refused(
+            "contacts between bodies of the options are not converted",
+            "convert without them, and add contacts",
         );
     }
     let Some(mut raw) = raw_model(file, text, options, &mut Findings::new(file, text), files) else {

@@ -69,6 +69,7 @@ def load(
     gravity: Optional[Sequence[float]] = ...,
     limits: bool = ...,
     floor: Optional[Tuple[float, float]] = ...,
+    self_contact: Optional[float] = ...,
     variant: Optional[str] = ...,
     wrenches: Sequence[str] = ...,
     gains: Union[Tuple[float, float], Mapping[str, Tuple[float, float]], None] = ...,
@@ -84,6 +85,7 @@ def check(
     gravity: Optional[Sequence[float]] = ...,
     limits: bool = ...,
     floor: Optional[Tuple[float, float]] = ...,
+    self_contact: Optional[float] = ...,
 ) -> List[Finding]: ...
 def convert(
     path: Optional[_Path] = ...,

@@ -26,7 +26,8 @@ use pyo3::types::PyList;
 
 /// Findings about a description.
 #[pyfunction]
-#[pyo3(signature = (path = None, *, text = None, format = "toml", base = "fixed", gravity = None, limits = false, floor = None))]
+#[pyo3(signature = (path = None, *, text = None, format = "toml", base = "fixed", gravity = None, limits = false, floor = None,
+    self_contact = None))]
 fn check<'py>(
     py: Python<'py>,
     path: Option<PathBuf>,
@@ -36,8 +37,9 @@ fn check<'py>(
     gravity: Option<[f64; 3]>,
     limits: bool,
     floor: Option<(f64, f64)>,
+    self_contact: Option<f64>,
 ) -> PyResult<Bound<'py, PyList>> {
-    read::check(py, &read::source(path, text, format)?, &read::options(base, gravity, limits, floor)?)
+    read::check(py, &read::source(path, text, format)?, &read::options(base, gravity, limits, floor, self_contact)?)
 }
 
 /// A description as one of the TOML format.
@@ -52,7 +54,7 @@ fn convert(
     gravity: Option<[f64; 3]>,
     limits: bool,
 ) -> PyResult<String> {
-    read::convert(py, &read::source(path, text, format)?, &read::options(base, gravity, limits, None)?)
+    read::convert(py, &read::source(path, text, format)?, &read::options(base, gravity, limits, None, None)?)
 }
 
 /// Name, arguments, results and documentation of an output.

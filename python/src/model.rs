@@ -310,7 +310,7 @@ impl Model {
 /// Reads a model.
 #[pyfunction]
 #[pyo3(signature = (path = None, *, text = None, format = "toml", base = "fixed", gravity = None, limits = false, floor = None,
-    variant = None, wrenches = Vec::new(), gains = None, arithmetic = "fast", search = true))]
+    self_contact = None, variant = None, wrenches = Vec::new(), gains = None, arithmetic = "fast", search = true))]
 pub fn load(
     py: Python<'_>,
     path: Option<PathBuf>,
@@ -320,6 +320,7 @@ pub fn load(
     gravity: Option<[f64; 3]>,
     limits: bool,
     floor: Option<(f64, f64)>,
+    self_contact: Option<f64>,
     variant: Option<String>,
     wrenches: Vec<String>,
     gains: Option<GivenGains>,
@@ -332,7 +333,7 @@ pub fn load(
         Some(GivenGains::All(gains)) => (Default::default(), Some(gains)),
         Some(GivenGains::Named(gains)) => (gains, None),
     };
-    let reading = (base.to_string(), gravity, limits, floor, variant, wrenches, gains);
+    let reading = (base.to_string(), gravity, limits, (floor, self_contact), variant, wrenches, gains);
     restore(py, (file, text, reading, (arithmetic.to_string(), search), Default::default()))
 }
 
@@ -345,8 +346,11 @@ pub enum GivenGains {
     Named(BTreeMap<String, (f64, f64)>),
 }
 
+/// Height and friction of a floor, and friction between bodies, where there are contacts.
+type Touching = (Option<(f64, f64)>, Option<f64>);
+
 /// Settings of [`load`] about the description.
-type Reading = (String, Option<[f64; 3]>, bool, Option<(f64, f64)>, Option<String>, Vec<String>, read::Gains);
+type Reading = (String, Option<[f64; 3]>, bool, Touching, Option<String>, Vec<String>, read::Gains);
 
 /// All that a model is made of: the name of its file, its text, settings of reading and of computing, other files.
 pub type Recipe = (String, String, Reading, (String, bool), read::Files);
@@ -354,10 +358,15 @@ pub type Recipe = (String, String, Reading, (String, bool), read::Files);
 /// Makes a model of its recipe, on another machine as well.
 #[pyfunction(name = "_restore")]
 pub fn restore(py: Python<'_>, mut recipe: Recipe) -> PyResult<Model> {
-    let (file, text, (base, gravity, limits, floor, variant, wrenches, gains), (arithmetic, search), files) =
-        &mut recipe;
+    let (
+        file,
+        text,
+        (base, gravity, limits, (floor, self_contact), variant, wrenches, gains),
+        (arithmetic, search),
+        files,
+    ) = &mut recipe;
     let source = read::Source { file: file.clone(), text: text.clone() };
-    let import = read::options(base, *gravity, *limits, *floor)?;
+    let import = read::options(base, *gravity, *limits, *floor, *self_contact)?;
     let Some(arithmetic) = Arithmetic::from_name(arithmetic) else {
         let names = Arithmetic::ALL.map(Arithmetic::name).join(", ");
         return Err(PyValueError::new_err(format!("no arithmetic is called `{arithmetic}`: take one of {names}")));

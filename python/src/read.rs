@@ -40,13 +40,14 @@ pub fn options(
     gravity: Option<[f64; 3]>,
     limits: bool,
     floor: Option<(f64, f64)>,
+    self_contact: Option<f64>,
 ) -> PyResult<ImportOptions> {
     let Some(base) = Base::from_name(base) else {
         let names = Base::ALL.map(Base::name);
         return Err(PyValueError::new_err(format!("no base is called `{base}`: take one of {}", names.join(", "))));
     };
     let floor = floor.map(|(height, friction)| Floor { height, friction });
-    Ok(ImportOptions { base, gravity, limits, floor })
+    Ok(ImportOptions { base, gravity, limits, floor, self_contact })
 }
 
 /// Files that a description reads, by their paths.

@@ -7,7 +7,7 @@ mod view;
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use multibody::codegen::options::DEFAULT_SNAP;
 use multibody::codegen::read::{Base, Floor, ImportOptions};
 use multibody::runtime::constrained::Stabilisation;
@@ -100,15 +100,20 @@ impl ImportArgs {
 
 /// What a robot touches: options of the readers, for commands to which it makes a difference.
 #[derive(Args, Clone, Copy)]
+#[command(group(ArgGroup::new("touched").multiple(true)))]
 pub struct TouchArgs {
     /// Make stops of the joint limits of a URDF or an MJCF model; a TOML model states them itself
     #[arg(long)]
     pub limits: bool,
     /// Put a floor at this height that the collision shapes of a URDF or the geoms of an MJCF model touch, m
-    #[arg(long, value_name = "Z", allow_hyphen_values = true, value_parser = finite)]
+    #[arg(long, value_name = "Z", allow_hyphen_values = true, value_parser = finite, group = "touched")]
     pub floor: Option<f64>,
-    /// Coefficient of friction on that floor
-    #[arg(long, value_name = "MU", default_value_t = 0.5, value_parser = finite, requires = "floor")]
+    /// Let the bodies of a URDF or an MJCF model touch each other by their shapes, but for bodies that a joint connects and
+    /// shapes that overlap at the start
+    #[arg(long, group = "touched")]
+    pub self_contact: bool,
+    /// Coefficient of friction on that floor and between bodies
+    #[arg(long, value_name = "MU", default_value_t = 0.5, value_parser = finite, requires = "touched")]
     pub friction: f64,
 }
 
@@ -116,7 +121,8 @@ impl TouchArgs {
     /// The same options for the readers, with these.
     pub fn of(&self, import: ImportOptions) -> ImportOptions {
         let floor = self.floor.map(|height| Floor { height, friction: self.friction });
-        ImportOptions { limits: self.limits, floor, ..import }
+        let self_contact = self.self_contact.then_some(self.friction);
+        ImportOptions { limits: self.limits, floor, self_contact, ..import }
     }
 }
 

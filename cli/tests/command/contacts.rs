@@ -220,6 +220,63 @@ fn robots_touch_a_floor_that_is_asked_for() {
     assert_eq!(run_in(&folder, &["check", "leg.urdf", "--friction", "0.3"]).status.code(), Some(2));
 }
 
+/// Two rods that hang beside each other.
+fn arms() -> String {
+    let arm = |name: &str, x: f64| {
+        format!(
+            r#"<link name="{name}">
+    <inertial><origin xyz="0 0 -0.25"/><mass value="1"/><inertia ixx="0.02" iyy="0.02" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0 0 -0.25"/><geometry><capsule radius="0.05" length="0.4"/></geometry></collision>
+  </link>
+  <joint name="to_{name}" type="revolute">
+    <parent link="base"/><child link="{name}"/><origin xyz="{x} 0 0"/><axis xyz="0 1 0"/>
+  </joint>"#
+        )
+    };
+    format!(r#"<robot name="arms"><link name="base"/>{}{}</robot>"#, arm("left", -0.15), arm("right", 0.15))
+}
+
+/// Distance of the surfaces of both rods, which do not cross, at these angles.
+fn apart([left, right]: [f64; 2]) -> f64 {
+    let ends = |x: f64, angle: f64| [0.05, 0.45].map(|along: f64| [x - along * angle.sin(), -along * angle.cos()]);
+    let to_line = |p: [f64; 2], [a, b]: [[f64; 2]; 2]| {
+        let (way, from) = ([b[0] - a[0], b[1] - a[1]], [p[0] - a[0], p[1] - a[1]]);
+        let square = way[0] * way[0] + way[1] * way[1];
+        let share = ((way[0] * from[0] + way[1] * from[1]) / square).clamp(0.0, 1.0);
+        (from[0] - share * way[0]).hypot(from[1] - share * way[1])
+    };
+    let (a, b) = (ends(-0.15, left), ends(0.15, right));
+    assert!(a[1][0] < b[1][0], "the tips have passed each other");
+    let all = a.map(|p| to_line(p, b)).into_iter().chain(b.map(|p| to_line(p, a)));
+    all.fold(f64::INFINITY, f64::min) - 0.1
+}
+
+/// The arms of a robot strike each other where that is asked for, and pass through each other otherwise.
+#[test]
+fn arms_of_a_robot_strike_each_other() {
+    let folder = folder("contacts_arms");
+    std::fs::write(folder.join("arms.urdf"), arms()).expect("a file");
+    let swing = ["simulate", "arms.urdf", "--time", "3", "--v=-4,0"];
+    let free = good(run_in(&folder, &swing));
+    assert!(!out(&free).contains("lands"), "{}", out(&free));
+    let touching = good(run_in(&folder, &[&swing[..], &["--self-contact", "--friction", "0.2"]].concat()));
+    assert!(out(&touching).contains("left/right lands at"), "{}", out(&touching));
+    let table = std::fs::read_to_string(folder.join("arms.csv")).expect("a table");
+    let (mut least, mut energy, mut first) = (f64::INFINITY, f64::INFINITY, None);
+    for line in table.lines().skip(1) {
+        let numbers: Vec<f64> = line.split(',').map(|x| x.parse().expect("a number")).collect();
+        least = least.min(apart([numbers[1], numbers[2]]));
+        let now = numbers[numbers.len() - 1];
+        assert!(now <= energy + 1e-7, "the energy rises at {} s: {energy} {now}", numbers[0]);
+        energy = now;
+        first.get_or_insert(now);
+    }
+    assert!(least > -1e-9, "{least}");
+    assert!(least < 1e-2 && first.is_some_and(|first| energy < first - 0.1), "{least} {first:?} {energy}");
+    let check = good(run_in(&folder, &["check", "arms.urdf", "--self-contact"]));
+    assert!(out(&check).contains("shapes: 2, contacts: 1"), "{}", out(&check));
+}
+
 /// The picture has the floor, the ball and the force on it with its scale; the motion is the same as without it.
 #[test]
 fn pictures_show_what_touches_and_its_forces() {

@@ -22,7 +22,7 @@ const CONSTANT: &str = "write a constant: coefficients of contacts are given aga
 
 /// What two surfaces do to each other.
 #[derive(Clone, Copy)]
-struct Surface {
+pub(super) struct Surface {
     friction: f64,
     restitution: f64,
     law: RestitutionLaw,
@@ -34,6 +34,8 @@ pub(super) struct Surfaces {
     each: Vec<Surface>,
     /// That of the others.
     others: Surface,
+    /// Those of the contacts between bodies that options ask for: of the pairs that the file lists, and of the others.
+    pub(super) pairs: Option<(Vec<Surface>, Surface)>,
 }
 
 impl Surfaces {
@@ -41,9 +43,21 @@ impl Surfaces {
     pub(super) fn new(raw: &RawModel, numbers: &mut Numbers) -> Surfaces {
         let none = Surface { friction: 0.0, restitution: 0.0, law: RestitutionLaw::default() };
         let others = surface(&raw.surface, none, "`contacts`", numbers);
-        let one = |c: &RawContact| surface(&c.surface, others, &format!("contact {}", quote(&c.name.value)), numbers);
-        Surfaces { each: raw.contacts.iter().map(one).collect(), others }
+        let each = own(&raw.contacts, others, numbers);
+        let pairs = raw.pairs.as_ref().map(|pairs| {
+            let friction = friction(&pairs.friction, "contacts between bodies", numbers);
+            let others = Surface { friction, ..others };
+            (own(&pairs.listed, others, numbers), others)
+        });
+        Surfaces { each, others, pairs }
     }
+}
+
+/// The surface of each contact, with what it does not state from another one.
+fn own(contacts: &[RawContact], otherwise: Surface, numbers: &mut Numbers) -> Vec<Surface> {
+    let mut one =
+        |c: &RawContact| surface(&c.surface, otherwise, &format!("contact {}", quote(&c.name.value)), numbers);
+    contacts.iter().map(&mut one).collect()
 }
 
 fn surface(raw: &RawSurface, otherwise: Surface, what: &str, numbers: &mut Numbers) -> Surface {
@@ -90,12 +104,12 @@ pub(super) fn restitution(x: &RawNumber, key: &str, what: &str, numbers: &mut Nu
 }
 
 /// A pair of shapes with what stands in messages about it.
-struct Pair {
-    name: Spanned<String>,
-    shapes: [usize; 2],
-    surface: Surface,
+pub(super) struct Pair {
+    pub(super) name: Spanned<String>,
+    pub(super) shapes: [usize; 2],
+    pub(super) surface: Surface,
     /// Place of the second shape's name.
-    at: Span,
+    pub(super) at: Span,
 }
 
 /// The contacts between shapes. `shapes` as in `raw`, `joints` in their final order.
@@ -204,7 +218,7 @@ fn apart(
 
 impl Pair {
     /// As many contacts as the shapes have places to touch at; `None` where the pair is not supported.
-    fn contacts(&self, [a, b]: [&Shape; 2], findings: &Findings) -> Option<Vec<Contact>> {
+    pub(super) fn contacts(&self, [a, b]: [&Shape; 2], findings: &Findings) -> Option<Vec<Contact>> {
         let direct = elementary(&a.kind, &b.kind).map(|places| (places, [a, b], self.shapes));
         let [i, j] = self.shapes;
         let (places, [a, b], shapes) = direct.or_else(|| Some((elementary(&b.kind, &a.kind)?, [b, a], [j, i])))?;
@@ -298,7 +312,9 @@ fn all(
         for (i, first) in shapes[..j].iter().enumerate() {
             let (Some(a), Some(b)) = (first, second) else { continue };
             let asked = raw.all_pairs.is_some() || [i, j].iter().any(|k| raw.floors.contains(k));
-            if !asked || listed.contains(&[i, j]) || !far(a, b) {
+            // A geom that touches nothing in MuJoCo is a shape only for the pairs of the file that name it.
+            let idle = |k: usize| raw.shapes[k].bits == Some([0; 2]);
+            if !asked || idle(i) || idle(j) || listed.contains(&[i, j]) || !far(a, b) {
                 continue;
             }
             let name = Spanned::new(format!("{}/{}", a.name, b.name), raw.shapes[j].name.span);
@@ -330,7 +346,7 @@ fn all(
 
 /// Reports a ball that does not fit into every hollow of a height field.
 #[cfg(feature = "height_fields")]
-fn tight([a, b]: [&Shape; 2], pair: &Pair, findings: &mut Findings) {
+pub(super) fn tight([a, b]: [&Shape; 2], pair: &Pair, findings: &mut Findings) {
     use crate::field::fit;
     let (field, ball, ground) = match (&a.kind, &b.kind) {
         (ShapeKind::HeightField { field, .. }, _) => (*field, b, a),

@@ -10,6 +10,8 @@ mod massless;
 mod merged;
 mod names;
 mod numbers;
+mod overlaps;
+mod pairs;
 mod shapes;
 mod starts;
 mod stops;
@@ -63,10 +65,11 @@ pub fn check(raw: &RawModel, findings: &mut Findings) -> Option<Model> {
     contacts.extend(stops::placed(stops, &place));
     contacts::distinct(raw, &contacts, findings);
     let shapes = shapes.into_iter().flatten().collect();
-    let model =
+    let mut model =
         Model { name, params, gravity, bodies, joints, frames, wrenches, constraints, shapes, contacts, starts };
     massless::leaves(raw, &order, &model, findings);
     moving(&model, findings);
+    pairs::add(raw, &surfaces, &mut model, findings);
     (!findings.has_errors()).then_some(model)
 }
 

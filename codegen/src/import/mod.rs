@@ -6,7 +6,7 @@ mod mesh;
 pub mod mjcf;
 pub mod raw;
 pub mod source;
-mod taken;
+pub(crate) mod taken;
 mod tally;
 pub mod toml;
 pub mod urdf;
@@ -39,6 +39,9 @@ pub struct ImportOptions {
     pub limits: bool,
     /// A floor that the shapes of the robot can touch; for URDF and MJCF only. Without one, they touch nothing.
     pub floor: Option<Floor>,
+    /// Contacts between the bodies of the robot, with this coefficient of friction; for URDF and MJCF only. Bodies that a
+    /// joint connects make none, and neither do shapes that overlap where the mechanism starts.
+    pub self_contact: Option<f64>,
 }
 
 /// The formats of XML files.

@@ -316,6 +316,8 @@ pub struct RawShape {
     pub name: Spanned<String>,
     /// Body, or `ground`; the ground where `None`.
     pub body: Option<Spanned<String>>,
+    /// MuJoCo's `contype` and `conaffinity`; `None` where the format has none. They matter to contacts that options ask for.
+    pub bits: Option<[u32; 2]>,
     /// Type; `None` where it was reported already.
     pub kind: Option<Spanned<&'static ShapeSpec>>,
     /// Pose in the body frame.
@@ -368,6 +370,7 @@ impl RawShape {
         RawShape {
             name,
             body: None,
+            bits: None,
             kind,
             placement: RawPlacement::default(),
             radius: None,
@@ -404,6 +407,25 @@ pub struct RawContact {
     pub between: Option<[Spanned<String>; 2]>,
     /// Its surfaces; that of all contacts, [`RawModel::surface`], where an entry is `None`.
     pub surface: RawSurface,
+}
+
+/// Contacts between the bodies of a robot, which options ask for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawPairs {
+    /// Coefficient of friction, where a pair states none.
+    pub friction: RawNumber,
+    /// Pairs of bodies, or `ground`, whose shapes do not touch each other.
+    pub excluded: Vec<[String; 2]>,
+    /// Pairs of shapes that the file lists, with surfaces of their own.
+    pub listed: Vec<RawContact>,
+}
+
+impl RawPairs {
+    /// Those of a file that lists none.
+    pub fn new(friction: f64) -> RawPairs {
+        let friction = RawNumber::constant(friction, Span::FILE);
+        RawPairs { friction, excluded: Vec::new(), listed: Vec::new() }
+    }
 }
 
 /// An external wrench.
@@ -475,6 +497,8 @@ pub struct RawModel {
     pub surface: RawSurface,
     /// Where contacts between all pairs of shapes are asked for.
     pub all_pairs: Option<Span>,
+    /// Contacts between bodies that options ask for.
+    pub pairs: Option<RawPairs>,
     /// Descriptions of the same mechanism after changes of its tree, in file order.
     pub variants: Vec<RawVariant>,
     /// Shapes, by their indices, that all other shapes can touch, whatever pairs are asked for.
@@ -503,6 +527,7 @@ impl RawModel {
             contacts: Vec::new(),
             surface: RawSurface::default(),
             all_pairs: None,
+            pairs: None,
             variants: Vec::new(),
             floors: Vec::new(),
             incomplete: false,

@@ -19,11 +19,17 @@ impl Taken {
     /// The name of a shape: `wanted`, with a number where an identifier that it becomes is taken: its own, or one of its
     /// `contacts` with a plane, which are numbered.
     pub(crate) fn shape(&mut self, wanted: &str, contacts: usize) -> String {
+        self.numbered(wanted, "_shape_", contacts)
+    }
+
+    /// The name of what becomes as many numbered contacts: `wanted`, with `separator` and a number where an identifier that
+    /// it becomes is taken.
+    pub(crate) fn numbered(&mut self, wanted: &str, separator: &str, contacts: usize) -> String {
         let identifiers = |name: &str| {
             let own = identifier(name);
             (1..=contacts).map(|k| format!("{own}_{k}")).chain([own.clone()]).collect()
         };
-        self.free(wanted, "_shape_", identifiers)
+        self.free(wanted, separator, identifiers)
     }
 
     /// A name that becomes one identifier: `wanted`, with `separator` and a number where that is taken.

@@ -8,6 +8,7 @@ mod large;
 mod mjcf;
 mod mutate;
 mod mutation;
+mod self_contact;
 mod toml_constraints;
 mod toml_contacts;
 mod toml_reader;

@@ -59,6 +59,8 @@ pub(super) struct Built<'d> {
     pub joints: HashMap<&'d str, Known>,
     /// Names of the frames of sites here.
     pub sites: HashMap<&'d str, String>,
+    /// Names of the shapes of geoms here; `None` for those that are none.
+    pub geoms: HashMap<&'d str, Option<String>>,
     /// Names of bodies and frames.
     pub taken: Taken,
     joint_names: Taken,
@@ -70,7 +72,7 @@ pub(super) fn all<'d>(
     reader: &mut Reader,
     bodies: &[Body<'d>],
     rules: Rules,
-    (solids, shape_names): (Solids, Taken),
+    (solids, shape_names): (Solids<'_, '_, 'd>, Taken),
     raw: &mut RawModel,
 ) -> Built<'d> {
     let mut built = Built { shape_names, ..Built::default() };
@@ -89,13 +91,13 @@ pub(super) fn all<'d>(
             (part, geom::read(reader, part, rules.compiler, &whose))
         });
         let geoms: Vec<(&Part, Geom)> = read.filter_map(|(part, geom)| Some((part, geom?))).collect();
-        let hulls = k > 0 && !raw.floors.is_empty();
+        let hulls = k > 0 && (!raw.floors.is_empty() || solids.listed.is_some());
         for (part, geom) in &geoms {
-            let Some(shape) =
-                geom.shape(reader, (&part.element, solids, hulls), &built.names[k], &mut built.shape_names)
-            else {
-                continue;
-            };
+            let shape = geom.shape(reader, (&part.element, solids, hulls), &built.names[k], &mut built.shape_names);
+            if let Some(name) = part.element.name() {
+                built.geoms.entry(name.value).or_insert(shape.as_ref().map(|shape| shape.name.value.clone()));
+            }
+            let Some(shape) = shape else { continue };
             // Where there is a floor, height fields are others.
             #[cfg(feature = "height_fields")]
             if shape.field.is_some() && !raw.floors.is_empty() {

@@ -1,5 +1,6 @@
 //! `geom`: shapes, their volumes and their inertias.
 
+use std::collections::HashSet;
 use std::f64::consts::PI;
 
 use super::element::{choice, flag, number, parsed, Element};
@@ -62,6 +63,8 @@ const TYPES: &[&str] = &["plane", "hfield", "sphere", "capsule", "ellipsoid", "c
 #[derive(Clone, Copy)]
 pub(super) struct Solids<'s, 'm, 'd> {
     pub meshes: &'s Meshes<'m, 'd>,
+    /// The geoms that the pairs of `contact` name, where contacts between bodies are asked for.
+    pub listed: Option<&'s HashSet<&'d str>>,
     #[cfg(feature = "height_fields")]
     pub fields: &'s super::hfield::Fields<'m, 'd>,
 }
@@ -86,7 +89,8 @@ pub(super) struct Geom<'d> {
     field: Option<Spanned<&'d str>>,
     /// The body that its mesh bounds, once it was read.
     solid: Option<Solid>,
-    touches: bool,
+    /// `contype` and `conaffinity`: a geom can touch another one where a bit of one is in the other of the other one.
+    bits: [u32; 2],
     /// Its place.
     pub span: Span,
 }
@@ -112,7 +116,7 @@ pub(super) fn read<'d>(reader: &mut Reader, part: &Part<'d>, compiler: &Compiler
             reader.findings.error(at, format!("{whose}`{key}` is negative"), "write a number that is not negative");
         }
     }
-    let touches = number(reader, "contype", 1.0) != 0.0 || number(reader, "conaffinity", 1.0) != 0.0;
+    let bits = ["contype", "conaffinity"].map(|key| number(reader, key, 1.0) as i64 as u32);
     let group = number(reader, "group", 0.0);
     let mesh = element.attribute("mesh");
     let sized = mesh.is_none() && !["mesh", "sdf", "hfield"].contains(&kind);
@@ -139,7 +143,7 @@ pub(super) fn read<'d>(reader: &mut Reader, part: &Part<'d>, compiler: &Compiler
         #[cfg(feature = "height_fields")]
         field: element.attribute("hfield"),
         solid: None,
-        touches,
+        bits,
         span: place(element.node),
     })
 }
@@ -293,7 +297,8 @@ impl Geom<'_> {
         body: &Spanned<String>,
         taken: &mut Taken,
     ) -> Option<RawShape> {
-        if !self.touches {
+        let listed = |name: Spanned<&str>| solids.listed.is_some_and(|listed| listed.contains(name.value));
+        if self.bits == [0; 2] && !element.name().is_some_and(listed) {
             return None;
         }
         #[cfg(feature = "height_fields")]
@@ -313,8 +318,8 @@ impl Geom<'_> {
             }
             (None, Some(_)) if !hulls => {
                 let message =
-                    "the mesh of a `geom` is not used for contacts: those of moving bodies are, where a floor \
-                               is asked for";
+                    "the mesh of a `geom` is not used for contacts: those of moving bodies are, where a floor or \
+                               contacts between bodies are asked for";
                 reader.tally.notice(self.span, message);
                 return None;
             }
@@ -350,7 +355,8 @@ impl Geom<'_> {
         let name = taken.shape(element.name().map_or(body.value.as_str(), |name| name.value), contacts);
         let name = Spanned::new(name, element.name().map_or(self.span, |name| name.span));
         let shape = RawShape::new(name, Some(Spanned::new(kind, self.span)));
-        Some(RawShape { body: Some(body.clone()), placement: self.pose.raw(self.span), ..shape })
+        let (body, bits) = (Some(body.clone()), Some(self.bits));
+        Some(RawShape { body, bits, placement: self.pose.raw(self.span), ..shape })
     }
 }
 

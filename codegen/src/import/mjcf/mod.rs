@@ -12,6 +12,7 @@ mod actuator;
 mod assets;
 mod build;
 mod classes;
+mod contact;
 mod element;
 mod equality;
 mod geom;
@@ -45,17 +46,16 @@ use roxmltree::{Document, Node};
 use settings::{Compiler, Options};
 
 /// Elements of a `mujoco` that are not read, and what is said of them.
-const IGNORED: [(&str, &str); 7] = [
+const IGNORED: [(&str, &str); 6] = [
     ("size", ""),
     ("visual", ""),
     ("statistic", ""),
     ("custom", "`custom` is not used"),
     ("sensor", "`sensor` is not used"),
     ("keyframe", "`keyframe` is not used: a motion starts where the file places the bodies"),
-    ("contact", "`contact` is not used: shapes touch nothing but the floor that is asked for"),
 ];
 
-const USED: [&str; 11] = [
+const USED: [&str; 12] = [
     "compiler",
     "option",
     "default",
@@ -67,6 +67,7 @@ const USED: [&str; 11] = [
     "extension",
     "include",
     "asset",
+    "contact",
 ];
 
 /// Reads a model without checking the mechanism; `None` where the text is no model of MuJoCo, or says something that
@@ -136,14 +137,22 @@ fn read_mujoco<'d>(
     let rules = Rules { compiler: &compiler, options: &settings, stops: options.limits };
     let assets = Assets::new(reader, &called("compiler"), files);
     let meshes = Meshes::new(reader, &called("asset"), &classes, &assets);
+    let listed = options.self_contact.map(|_| contact::listed(&called("contact")));
     let solids = Solids {
         meshes: &meshes,
+        listed: listed.as_ref(),
         #[cfg(feature = "height_fields")]
-        fields: &hfield::Fields::new(reader, &called("asset"), &assets, options.floor.is_some()),
+        fields: &hfield::Fields::new(
+            reader,
+            &called("asset"),
+            &assets,
+            options.floor.is_some() || options.self_contact.is_some(),
+        ),
     };
     let mut built = build::all(reader, &bodies, rules, (solids, shapes), &mut raw);
     meshes.tell(reader);
     touching(reader, root, options, &raw);
+    raw.pairs = contact::pairs(reader, &called("contact"), &classes, &built, options.self_contact);
     let mut tendons = HashMap::new();
     for section in called("tendon") {
         tendon::all(reader, section, &classes, &built, rules, &mut raw, &mut tendons);
@@ -189,11 +198,12 @@ fn deformable(reader: &mut Reader, sections: &[Node]) {
 fn touching(reader: &mut Reader, root: Node, options: &ImportOptions, raw: &RawModel) {
     let of_bodies = |raw: &RawModel| raw.shapes.iter().any(|s| s.body.as_ref().is_some_and(|b| b.value != "ground"));
     match options.floor {
+        None if options.self_contact.is_some() => {}
         None => {
             for shape in &raw.shapes {
                 reader.tally.notice(
                     shape.kind.as_ref().map_or(Span::FILE, |kind| kind.span),
-                    "a `geom` touches nothing unless a floor is asked for (`--floor` of `mbd simulate`)",
+                    "a `geom` touches nothing unless a floor or contacts between bodies are asked for (`--floor`, `--self-contact` of `mbd simulate`)",
                 );
             }
         }

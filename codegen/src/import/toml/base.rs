@@ -48,7 +48,7 @@ pub(super) fn read(table: &Table, options: &ImportOptions, findings: &mut Findin
     };
     // What the caller states goes first.
     let base = if options.base == Base::default() { root.unwrap_or_default() } else { options.base };
-    let options = ImportOptions { base, gravity: None, limits: limits || options.limits, floor: options.floor };
+    let options = ImportOptions { base, gravity: None, limits: limits || options.limits, ..*options };
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let placed = |text: &str, findings: &mut Findings| {
         let start = findings.add_base(&path.to_string_lossy(), text.to_string());

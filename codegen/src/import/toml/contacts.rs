@@ -78,6 +78,7 @@ fn shape(table: &Table, named: &Named, raw: &mut RawModel, findings: &mut Findin
     let kind = kind(table, SHAPES, |spec| &spec.words, special, findings);
     let word = kind.as_ref().map_or("", |kind| kind.value.word());
     let shape = RawShape {
+        bits: None,
         name: name.clone().unwrap_or(Spanned::new(String::new(), table.span)),
         body: table.text("body", findings),
         kind,

@@ -57,7 +57,7 @@ fn refuse_options(options: &ImportOptions, findings: &mut Findings) {
         let help = "leave the option out; in the file the joints to `ground` say how the model is attached";
         findings.error(Span::FILE, "a TOML model states its own base", help);
     }
-    if options.limits || options.floor.is_some() {
+    if options.limits || options.floor.is_some() || options.self_contact.is_some() {
         let help = "leave these options out; in the file, `limits`, `[[shape]]` and `[[contact]]` describe them";
         findings.error(Span::FILE, "a TOML model states its own limits and contacts", help);
     }

@@ -10,8 +10,9 @@ use crate::import::xml::{place, Reader};
 use crate::import::ReadFile;
 use roxmltree::Node;
 
-/// What is said where no floor is asked for.
-pub(super) const IDLE: &str = "`mesh` of a `collision` is not used: meshes are read where a floor is asked for";
+/// What is said where neither a floor nor contacts between bodies are asked for.
+pub(super) const IDLE: &str =
+    "`mesh` of a `collision` is not used: meshes are read where a floor or contacts between bodies are asked for";
 const LOST: &str = "`mesh` of a `collision` is not used: its file was not found";
 const OTHER: &str = "`mesh` of a `collision` is not used: only STL and OBJ files are read";
 const WITHOUT: &str = "`mesh` of a `collision` is not used: this program was built without the feature `hulls`";

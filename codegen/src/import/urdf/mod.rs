@@ -3,7 +3,7 @@
 //! Every element and attribute is used, named in a finding, or an error. Elements without effect on the free motion
 //! (what is there to look at, limits, extensions of simulators) are counted, with one notice for each kind; unknown
 //! elements are warnings. Macros, entities and other formats are errors. Shapes are read, but act only where the options
-//! ask for a floor; limits are stops where the options ask for them.
+//! ask for a floor or for contacts between bodies; limits are stops where the options ask for them.
 
 mod joint;
 mod link;
@@ -14,7 +14,7 @@ mod shape;
 mod tests;
 
 use self::mesh::Meshes;
-use super::raw::{RawBody, RawGravity, RawJoint, RawModel};
+use super::raw::{RawBody, RawGravity, RawJoint, RawModel, RawPairs};
 use super::source::{Findings, Spanned};
 use super::taken::Taken;
 use super::tally::Tally;
@@ -40,8 +40,8 @@ const IGNORED: [(&str, &str); 6] = [
 ///
 /// The joint `root_joint`, of the kind in `options.base`, connects the root link to the ground. Links stay bodies and
 /// fixed joints stay joints. A link called `ground`, a name this project keeps for the fixed world, becomes
-/// `ground_link`. Where the options ask for a floor, the meshes that the text names are read by `files`, from places beside
-/// `path`.
+/// `ground_link`. Where the options ask for what shapes touch, the meshes that the text names are read by `files`, from
+/// places beside `path`.
 pub fn read(
     text: &str,
     options: &ImportOptions,
@@ -58,7 +58,8 @@ pub fn read(
         }
     };
     let mut reader = Reader { findings, tally: Tally::default() };
-    let meshes = options.floor.map(|_| Meshes::new(path, files));
+    let touching = options.floor.is_some() || options.self_contact.is_some();
+    let meshes = touching.then(|| Meshes::new(path, files));
     let raw = read_robot(&mut reader, document.root_element(), options, meshes);
     let Reader { findings, tally } = reader;
     tally.report(findings);
@@ -94,6 +95,7 @@ fn read_robot(
     if let Some(floor) = options.floor {
         floor::add(floor, &mut taken, &mut raw);
     }
+    raw.pairs = options.self_contact.map(RawPairs::new);
     for child in reader.children(node, &["link", "joint"], &IGNORED) {
         if child.tag_name().name() == "link" {
             let body = link::read(reader, child);

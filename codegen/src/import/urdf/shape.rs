@@ -13,9 +13,10 @@ use crate::import::xml::{is_own, place, Reader};
 use crate::model::{ShapeSpec, SHAPES};
 use roxmltree::Node;
 
-const IDLE: &str = "a `collision` touches nothing unless a floor is asked for (`--floor` of `mbd simulate`)";
+const IDLE: &str = "a `collision` touches nothing unless a floor or contacts between bodies are asked for (`--floor`, `--self-contact` of `mbd simulate`)";
 
-/// Reads the shapes of a link. Without a floor, there are no `meshes`, and shapes are said to touch nothing.
+/// Reads the shapes of a link. Where nothing is asked for that they touch, there are no `meshes`, and
+/// shapes are said to touch nothing.
 pub(super) fn all(
     reader: &mut Reader,
     link: Node,

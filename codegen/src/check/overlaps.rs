@@ -1,0 +1,69 @@
+//! Which pairs of shapes overlap where a mechanism starts.
+
+use mbd_runtime::constrained::{close, Closing};
+use mbd_runtime::sweep::FrameState;
+use mbd_runtime::system::Constrained;
+
+use super::elementary::Rounded;
+use super::pairs::Candidate;
+use crate::inertia::{apply, transpose};
+use crate::model::{Frame, Model, ShapeKind};
+use crate::options::PlanOptions;
+use crate::plan::Plan;
+
+/// Overlaps up to this one are rounding, m.
+const ROUNDING: f64 = 1e-10;
+
+/// Whether the shapes of each pair overlap where the motion starts, with all parameters at their defaults and loops closed.
+pub(super) fn overlapping(model: &Model, candidates: &[Candidate]) -> Vec<bool> {
+    if candidates.is_empty() {
+        return Vec::new();
+    }
+    let mut trial = model.clone();
+    trial.contacts = candidates.iter().flat_map(|candidate| candidate.contacts.iter().cloned()).collect();
+    let frame = |shape: &crate::model::Shape| {
+        let mount = &shape.mount;
+        Frame { name: shape.name.clone(), body: mount.body, placement: mount.placement }
+    };
+    trial.frames = model.shapes.iter().map(frame).collect();
+    let plan = Plan::new(&trial, PlanOptions::default().snap);
+    let params = plan.default_params();
+    let mut q = plan.start();
+    if !plan.constraints.is_empty() {
+        let mut closed = q.clone();
+        // A loop that does not close is reported by whoever starts a motion there.
+        if close(&mut plan.interpreter::<f64>(&params), &mut closed, &Closing::holding(&plan.held())).is_ok() {
+            q = closed;
+        }
+    }
+    let mut full = plan.with_contacts().interpreter::<f64>(&params);
+    let (mut residuals, mut entries) = (full.zero_rows(), full.zero_entries());
+    full.residuals(&q, &mut residuals, &mut entries);
+    // Those of the bodies come first.
+    let mut all = vec![FrameState::ground(); full.tree().frames.len()];
+    full.frames(&q, &vec![0.0; plan.dims.nv], &mut all);
+    let frames = &all[all.len().saturating_sub(trial.frames.len())..];
+    let rows = plan.contacts::<f64>();
+    let mut first = 0;
+    let overlaps = |candidate: &Candidate| {
+        let own = &rows[first..first + candidate.contacts.len()];
+        first += candidate.contacts.len();
+        let [a, b] = candidate.shapes;
+        own.iter().any(|contact| residuals[contact.row] < -ROUNDING)
+            || pierces([&model.shapes[a].kind, &model.shapes[b].kind], [&frames[a], &frames[b]])
+            || pierces([&model.shapes[b].kind, &model.shapes[a].kind], [&frames[b], &frames[a]])
+    };
+    candidates.iter().map(overlaps).collect()
+}
+
+/// Whether the line of a capsule goes through the second shape from side to side. Its ends are then outside, and the edges
+/// of the other shape may be far, so that no gap tells.
+fn pierces([rod, solid]: [&ShapeKind; 2], [at, of]: [&FrameState<f64>; 2]) -> bool {
+    let &ShapeKind::Capsule { length, .. } = rod else { return false };
+    let inside = |z: f64| {
+        let along = apply(&at.rotation, [0.0, 0.0, z]);
+        let from = [0, 1, 2].map(|k| at.position[k] + along[k] - of.position[k]);
+        apply(&transpose(&of.rotation), from)
+    };
+    Rounded::new(solid).is_some_and(|solid| solid.is_crossed([inside(-0.5 * length), inside(0.5 * length)]))
+}
