@@ -14,13 +14,16 @@ use crate::plan::Plan;
 /// Overlaps up to this one are rounding, m.
 const ROUNDING: f64 = 1e-10;
 
+/// Contacts that are looked at together, or those of one pair: what an interpreter stores grows with the square of their number.
+const TOGETHER: usize = 64;
+
 /// Whether the shapes of each pair overlap where the motion starts, with all parameters at their defaults and loops closed.
 pub(super) fn overlapping(model: &Model, candidates: &[Candidate]) -> Vec<bool> {
     if candidates.is_empty() {
         return Vec::new();
     }
     let mut trial = model.clone();
-    trial.contacts = candidates.iter().flat_map(|candidate| candidate.contacts.iter().cloned()).collect();
+    trial.contacts.clear();
     let frame = |shape: &crate::model::Shape| {
         let mount = &shape.mount;
         Frame { name: shape.name.clone(), body: mount.body, placement: mount.placement }
@@ -36,13 +39,31 @@ pub(super) fn overlapping(model: &Model, candidates: &[Candidate]) -> Vec<bool> 
             q = closed;
         }
     }
+    let (mut overlaps, mut rest) = (Vec::with_capacity(candidates.len()), candidates);
+    while let Some(first) = rest.first() {
+        let (mut count, mut contacts) = (1, first.contacts.len());
+        while let Some(next) = rest.get(count).filter(|next| contacts + next.contacts.len() <= TOGETHER) {
+            (count, contacts) = (count + 1, contacts + next.contacts.len());
+        }
+        let (these, others) = rest.split_at(count);
+        trial.contacts = these.iter().flat_map(|candidate| candidate.contacts.iter().cloned()).collect();
+        overlaps.extend(overlapping_at(&q, &trial, these));
+        rest = others;
+    }
+    overlaps
+}
+
+/// The same at these coordinates, for a model that has the contacts of the pairs, and a frame on each shape.
+fn overlapping_at(q: &[f64], model: &Model, candidates: &[Candidate]) -> Vec<bool> {
+    let plan = Plan::new(model, PlanOptions::default().snap);
+    let params = plan.default_params();
     let mut full = plan.with_contacts().interpreter::<f64>(&params);
     let (mut residuals, mut entries) = (full.zero_rows(), full.zero_entries());
-    full.residuals(&q, &mut residuals, &mut entries);
+    full.residuals(q, &mut residuals, &mut entries);
     // Those of the bodies come first.
     let mut all = vec![FrameState::ground(); full.tree().frames.len()];
-    full.frames(&q, &vec![0.0; plan.dims.nv], &mut all);
-    let frames = &all[all.len().saturating_sub(trial.frames.len())..];
+    full.frames(q, &vec![0.0; plan.dims.nv], &mut all);
+    let frames = &all[all.len().saturating_sub(model.frames.len())..];
     let rows = plan.contacts::<f64>();
     let mut first = 0;
     let overlaps = |candidate: &Candidate| {

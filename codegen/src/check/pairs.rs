@@ -15,8 +15,11 @@ use crate::model::{Contact, Freedom, Joint, Model, ShapeKind, Unit, Value};
 /// Most contacts of a pair that the file does not list: a rod and a box have 14.
 const DEAR: usize = 32;
 
-/// Most contacts of all pairs together.
-const MOST: usize = 10_000;
+/// Most contacts of all pairs together: work and memory grow with the square of their number.
+const MOST: usize = 1000;
+
+/// Most contacts that are looked at for overlaps.
+const MOST_LOOKED_AT: usize = 10_000;
 
 /// Most pairs that are named for each reason.
 const SHOWN: usize = 8;
@@ -53,9 +56,7 @@ pub(super) fn add(raw: &RawModel, surfaces: &Surfaces, model: &mut Model, findin
     let listed = listed(pairs, &surfaces.0, &mut gathered, &bodies, findings);
     let whole = listed.and_then(|seen| others((raw, pairs), surfaces.1, &seen, &mut gathered, &bodies, findings));
     if whole.is_none() {
-        let message = format!("the shapes of the bodies are more than {MOST} contacts");
-        let help = "leave the contacts between bodies out, or describe the bodies by fewer shapes";
-        return findings.error(Span::FILE, message, help);
+        return too_many(findings);
     }
     let Gathered { candidates, mut left_out, .. } = gathered;
     let (overlaps, before) = (overlapping(model, &candidates), model.contacts.len());
@@ -65,11 +66,23 @@ pub(super) fn add(raw: &RawModel, surfaces: &Surfaces, model: &mut Model, findin
             false => model.contacts.extend(candidate.contacts),
         }
     }
+    if model.contacts.len() - before > MOST {
+        too_many(findings);
+    }
     if model.contacts.len() == before {
         let help = "give bodies that no joint connects spheres or capsules to touch with, or leave this option out";
         findings.warning(Span::FILE, "no contacts between bodies were found", help);
     }
     left_out.tell(findings);
+}
+
+fn too_many(findings: &mut Findings) {
+    let help = "leave the contacts between bodies out, or describe the bodies by fewer shapes; in MJCF, `exclude` pairs of bodies";
+    findings.error(
+        Span::FILE,
+        format!("the shapes of the bodies have more than {MOST} contacts with each other"),
+        help,
+    );
 }
 
 /// The pairs that were left out, by the reason.
@@ -143,7 +156,7 @@ impl<'m> Gathered<'m> {
         }
         self.total += contacts.len();
         self.candidates.push(Candidate { name, shapes: pair.shapes, contacts });
-        (self.total <= MOST).then_some(())
+        (self.total <= MOST_LOOKED_AT).then_some(())
     }
 }
 
