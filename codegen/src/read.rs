@@ -208,6 +208,10 @@ fn raw_model(
         findings.error(Span::FILE, message, help);
         None
     };
+    if options.self_contact.is_some() && !cfg!(feature = "self_contact") {
+        let help = "build it with the feature `self_contact` of `mbd-codegen`";
+        return refuse("contacts between bodies are not part of this program", help);
+    }
     const KNOWN: &str = "models are read from `.toml`, `.urdf` and `.xml` files";
     match extension.as_deref() {
         Some("toml") => toml::read(text, options, findings, files),

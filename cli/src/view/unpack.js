@@ -22,9 +22,10 @@ function letters(text) {
   return out.subarray(0, n);
 }
 
-// Decompresses LZMA with its header of 13 bytes and an end mark (I. Pavlov's specification).
+// Decompresses LZMA with its header of 13 bytes and an end mark (I. Pavlov's specification), without bits of the position
+// (`lp` and `pb` are 0).
 function unlzma(input) {
-  const lc = input[0] % 9, lp = Math.floor(input[0] / 9) % 5, pb = Math.floor(input[0] / 45);
+  const lc = input[0];
   let out = new Uint8Array(1 << 22), n = 0, at = 18, range = -1 >>> 0;
   let code = ((input[14] << 24) | (input[15] << 16) | (input[16] << 8) | input[17]) >>> 0;
   const odds = (count) => new Uint16Array(count).fill(1024);
@@ -74,13 +75,13 @@ function unlzma(input) {
     }
     return value;
   };
-  const literal = odds(0x300 << (lc + lp)), isMatch = odds(192), isRep = odds(12), repG0 = odds(12), repG1 = odds(12), repG2 = odds(12), rep0Long = odds(192);
+  const literal = odds(0x300 << lc), isMatch = odds(12), isRep = odds(12), repG0 = odds(12), repG1 = odds(12), repG2 = odds(12), rep0Long = odds(12);
   const slot = odds(256), special = odds(128), align = odds(16);
-  const lengths = () => ({ choice: odds(2), low: odds(16 << 3), mid: odds(16 << 3), high: odds(256) });
+  const lengths = () => ({ choice: odds(2), low: odds(8), mid: odds(8), high: odds(256) });
   const matchLength = lengths(), repLength = lengths();
-  const length = ({ choice, low, mid, high }, state) => {
-    if (!bit(choice, 0)) return 2 + tree(low, state << 3, 3);
-    return bit(choice, 1) ? 18 + tree(high, 0, 8) : 10 + tree(mid, state << 3, 3);
+  const length = ({ choice, low, mid, high }) => {
+    if (!bit(choice, 0)) return 2 + tree(low, 0, 3);
+    return bit(choice, 1) ? 18 + tree(high, 0, 8) : 10 + tree(mid, 0, 3);
   };
   let state = 0, [rep0, rep1, rep2, rep3] = [0, 0, 0, 0];
   for (;;) {
@@ -89,9 +90,8 @@ function unlzma(input) {
       larger.set(out);
       out = larger;
     }
-    const position = n & ((1 << pb) - 1);
-    if (!bit(isMatch, (state << 4) + position)) {
-      const before = n ? out[n - 1] : 0, base = 0x300 * (((n & ((1 << lp) - 1)) << lc) + (before >> (8 - lc)));
+    if (!bit(isMatch, state)) {
+      const before = n ? out[n - 1] : 0, base = 0x300 * (before >> (8 - lc));
       let symbol = 1;
       if (state >= 7) {
         let match = out[n - rep0 - 1];
@@ -110,7 +110,7 @@ function unlzma(input) {
     let count;
     if (bit(isRep, state)) {
       if (!bit(repG0, state)) {
-        if (!bit(rep0Long, (state << 4) + position)) {
+        if (!bit(rep0Long, state)) {
           state = state < 7 ? 9 : 11;
           out[n] = out[n - rep0 - 1];
           n++;
@@ -119,11 +119,11 @@ function unlzma(input) {
       } else if (!bit(repG1, state)) [rep0, rep1] = [rep1, rep0];
       else if (!bit(repG2, state)) [rep0, rep1, rep2] = [rep2, rep0, rep1];
       else [rep0, rep1, rep2, rep3] = [rep3, rep0, rep1, rep2];
-      count = length(repLength, position);
+      count = length(repLength);
       state = state < 7 ? 8 : 11;
     } else {
       [rep1, rep2, rep3] = [rep0, rep1, rep2];
-      count = length(matchLength, position);
+      count = length(matchLength);
       state = state < 7 ? 7 : 10;
       const first = tree(slot, Math.min(count - 2, 3) << 6, 6);
       rep0 = first;

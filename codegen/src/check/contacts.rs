@@ -44,7 +44,7 @@ impl Surfaces {
         let none = Surface { friction: 0.0, restitution: 0.0, law: RestitutionLaw::default() };
         let others = surface(&raw.surface, none, "`contacts`", numbers);
         let each = own(&raw.contacts, others, numbers);
-        let pairs = raw.pairs.as_ref().map(|pairs| {
+        let pairs = raw.pairs.as_ref().filter(|_| cfg!(feature = "self_contact")).map(|pairs| {
             let friction = friction(&pairs.friction, "contacts between bodies", numbers);
             let others = Surface { friction, ..others };
             (own(&pairs.listed, others, numbers), others)

@@ -69,7 +69,9 @@ pub fn check(raw: &RawModel, findings: &mut Findings) -> Option<Model> {
         Model { name, params, gravity, bodies, joints, frames, wrenches, constraints, shapes, contacts, starts };
     massless::leaves(raw, &order, &model, findings);
     moving(&model, findings);
-    pairs::add(raw, &surfaces, &mut model, findings);
+    if cfg!(feature = "self_contact") {
+        pairs::add(raw, &surfaces, &mut model, findings);
+    }
     (!findings.has_errors()).then_some(model)
 }
 

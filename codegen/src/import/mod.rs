@@ -44,6 +44,14 @@ pub struct ImportOptions {
     pub self_contact: Option<f64>,
 }
 
+impl ImportOptions {
+    /// The coefficient of friction between the bodies of a robot, where contacts between them are asked for, and built in.
+    #[inline]
+    pub(crate) fn between_bodies(&self) -> Option<f64> {
+        self.self_contact.filter(|_| cfg!(feature = "self_contact"))
+    }
+}
+
 /// The formats of XML files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum XmlFormat {

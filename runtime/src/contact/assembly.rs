@@ -80,6 +80,12 @@ pub(super) struct Shared<'a> {
     pub trees: &'a [usize],
 }
 
+impl Shared<'_> {
+    fn any(self) -> bool {
+        cfg!(feature = "hulls") && !self.lines.is_empty()
+    }
+}
+
 /// The column of a line among those of unit forces, and the trees on which its force acts.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Solved {
@@ -105,6 +111,10 @@ impl<'b, S: Real> Columns<'b, S> {
     /// `trees`. `solved` stays empty where each line has its own column.
     pub(super) fn merge(&self, contacts: &[Contact<S>], trees: &[[usize; 2]], solved: &mut Vec<Solved>) {
         solved.clear();
+        if !cfg!(feature = "hulls") {
+            // Where bodies are few, it is not worth its code.
+            return;
+        }
         let (mut columns, mut count) = (0, 0);
         for (i, &k) in self.of.contacts.iter().enumerate() {
             let one = Forces { contacts: &[k], touches: self.of.touches.and_then(|touches| touches.get(i..)) };
@@ -132,7 +142,7 @@ impl<S: Real> ColumnsOf<'_, '_, S> {
     pub fn momenta<const L: usize>(&self, i: usize, p: &mut [S]) {
         p.fill(S::zero());
         let places = Places { rows: self.rows, columns: self.places, entries: self.columns.entries };
-        if !self.shared.lines.is_empty() {
+        if self.shared.any() {
             for (line, solved) in lines(self.contacts, self.columns.of).zip(self.shared.lines) {
                 if let Some(lane) = (solved.column + 1).checked_sub(i).filter(|lane| *lane < L) {
                     places.unit_force::<L>(line, lane, p);
@@ -156,7 +166,7 @@ impl<S: Real> ColumnsOf<'_, '_, S> {
                 *rest = get(v, 0);
             }
         }
-        if !shared.lines.is_empty() {
+        if shared.any() {
             return places.take_shared::<L>(i, *shared, lines(contacts, *of), (rest, v), (a, own));
         }
         let count = lines(contacts, *of).count();

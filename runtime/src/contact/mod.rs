@@ -5,6 +5,8 @@
 //! tangential rows follow.
 
 mod assembly;
+#[cfg(feature = "alloc")]
+mod beside;
 mod derivatives;
 mod fall;
 mod hybrid;
@@ -37,6 +39,7 @@ pub use touching::{Reach, Touching};
 pub use with_contacts::WithContacts;
 
 /// Number of contacts up to which all gaps are computed at once: finding out which are far takes as long.
+#[cfg(any(feature = "alloc", feature = "hulls"))]
 const FEW: usize = 8;
 
 /// How a contact with restitution throws its bodies apart.

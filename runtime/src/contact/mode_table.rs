@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use core::ops::{Deref, DerefMut};
 
 use super::assembly::{Columns, ColumnsOf, Shared, Solved};
+use super::beside::{one_by_one, trees_of};
 use super::{rows_that_act, Contact, Mode, Reach, Touching, Way};
 use crate::interp::{ImplicitSprings, Interpreter};
 use crate::system::{
@@ -162,7 +163,8 @@ impl<Y: Reducible> ModeTable<Y> {
         let open = vec![Mode::Open; contacts.len()];
         let first = full.acting(&rows_that_act(full.rows().len(), &contacts, &open));
         let (reaches, wanted) = (full.reaches(&contacts), vec![true; full.rows().len()]);
-        let trees = full.trees();
+        // Where bodies are few, it is not worth its code.
+        let trees = if cfg!(feature = "hulls") { full.trees() } else { Vec::new() };
         ModeTable {
             modes: vec![(open, first)],
             current: 0,
@@ -411,7 +413,7 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
         if current.project_several(t, q, &mut of) {
             return true;
         }
-        if solved.is_empty() {
+        if !cfg!(feature = "hulls") || solved.is_empty() {
             return false;
         }
         let ([p, v], sigma) = spare;
@@ -473,41 +475,4 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
         }
         evaluator.swap_inputs(current);
     }
-}
-
-/// Solves for momenta one after the other.
-fn one_by_one<S: Real, P: AsMut<[S]>>(
-    of: &mut ColumnsOf<S>,
-    [p, v]: [&mut P; 2],
-    mut solve: impl FnMut(&mut P, &mut P),
-) {
-    for i in 0..of.count() {
-        of.momenta::<1>(i, p.as_mut());
-        solve(p, v);
-        of.take::<1>(i, v.as_mut());
-    }
-}
-
-/// The trees on which the rows of each contact act: one tree twice where there is one. Empty where trees are not known, or where
-/// there is only one.
-fn trees_of<Y: Constrained>(full: &Y, contacts: &[Contact<Y::Scalar>], trees: &[usize]) -> Vec<[usize; 2]> {
-    // Loops and couplings act from tree to tree as well.
-    let loops = full.rows().len() > contacts.iter().map(Contact::rows).sum();
-    if loops || trees.iter().all(|tree| trees.first() == Some(tree)) {
-        return Vec::new();
-    }
-    let of = |contact: &Contact<Y::Scalar>| {
-        let rows = full.rows().get(contact.row..contact.row + contact.rows()).unwrap_or(&[]);
-        let columns =
-            rows.iter().flat_map(|row| full.entry_columns().get(row.first..row.first + row.len).unwrap_or(&[]));
-        let mut all: Vec<usize> = columns.filter_map(|column| trees.get(*column).copied()).collect();
-        all.sort_unstable();
-        all.dedup();
-        match all[..] {
-            [a] => Some([a, a]),
-            [a, b] => Some([a, b]),
-            _ => None,
-        }
-    };
-    contacts.iter().map(of).collect::<Option<_>>().unwrap_or_default()
 }

@@ -94,7 +94,7 @@ pub(super) fn all<'d>(
         let hulls = k > 0 && (!raw.floors.is_empty() || solids.listed.is_some());
         for (part, geom) in &geoms {
             let shape = geom.shape(reader, (&part.element, solids, hulls), &built.names[k], &mut built.shape_names);
-            if let Some(name) = part.element.name() {
+            if let (Some(name), true) = (part.element.name(), cfg!(feature = "self_contact")) {
                 built.geoms.entry(name.value).or_insert(shape.as_ref().map(|shape| shape.name.value.clone()));
             }
             let Some(shape) = shape else { continue };

@@ -9,6 +9,7 @@ use crate::import::raw::{RawContact, RawNumber, RawPairs, RawSurface};
 use crate::import::source::Spanned;
 use crate::import::words::{did_you_mean, quote};
 use crate::import::xml::{place, Reader};
+use crate::import::ImportOptions;
 use roxmltree::Node;
 
 /// Attributes of a `pair`; those of MuJoCo's solver are not read.
@@ -38,15 +39,15 @@ pub(super) fn listed<'d>(sections: &[Node<'d, 'd>]) -> HashSet<&'d str> {
     pairs.flat_map(|node| ["geom1", "geom2"].map(|key| attribute(node, key))).flatten().map(|name| name.value).collect()
 }
 
-/// Reads the `contact` elements where contacts between bodies, of this friction, are asked for.
+/// Reads the `contact` elements where the options ask for contacts between bodies.
 pub(super) fn pairs(
     reader: &mut Reader,
     sections: &[Node],
     classes: &Classes,
     built: &Built,
-    friction: Option<f64>,
+    options: &ImportOptions,
 ) -> Option<RawPairs> {
-    let Some(friction) = friction else {
+    let Some(friction) = options.between_bodies() else {
         sections.iter().for_each(|section| reader.tally.notice(place(*section), IDLE));
         return None;
     };

@@ -137,7 +137,7 @@ fn read_mujoco<'d>(
     let rules = Rules { compiler: &compiler, options: &settings, stops: options.limits };
     let assets = Assets::new(reader, &called("compiler"), files);
     let meshes = Meshes::new(reader, &called("asset"), &classes, &assets);
-    let listed = options.self_contact.map(|_| contact::listed(&called("contact")));
+    let listed = options.between_bodies().map(|_| contact::listed(&called("contact")));
     let solids = Solids {
         meshes: &meshes,
         listed: listed.as_ref(),
@@ -146,13 +146,13 @@ fn read_mujoco<'d>(
             reader,
             &called("asset"),
             &assets,
-            options.floor.is_some() || options.self_contact.is_some(),
+            options.floor.is_some() || options.between_bodies().is_some(),
         ),
     };
     let mut built = build::all(reader, &bodies, rules, (solids, shapes), &mut raw);
     meshes.tell(reader);
     touching(reader, root, options, &raw);
-    raw.pairs = contact::pairs(reader, &called("contact"), &classes, &built, options.self_contact);
+    raw.pairs = contact::pairs(reader, &called("contact"), &classes, &built, options);
     let mut tendons = HashMap::new();
     for section in called("tendon") {
         tendon::all(reader, section, &classes, &built, rules, &mut raw, &mut tendons);
@@ -198,12 +198,12 @@ fn deformable(reader: &mut Reader, sections: &[Node]) {
 fn touching(reader: &mut Reader, root: Node, options: &ImportOptions, raw: &RawModel) {
     let of_bodies = |raw: &RawModel| raw.shapes.iter().any(|s| s.body.as_ref().is_some_and(|b| b.value != "ground"));
     match options.floor {
-        None if options.self_contact.is_some() => {}
+        None if options.between_bodies().is_some() => {}
         None => {
             for shape in &raw.shapes {
                 reader.tally.notice(
                     shape.kind.as_ref().map_or(Span::FILE, |kind| kind.span),
-                    "a `geom` touches nothing unless a floor or contacts between bodies are asked for (`--floor`, `--self-contact` of `mbd simulate`)",
+                    "a `geom` touches nothing unless that is asked for (`--floor`, `--self-contact` of `mbd simulate`)",
                 );
             }
         }

@@ -58,7 +58,7 @@ pub fn read(
         }
     };
     let mut reader = Reader { findings, tally: Tally::default() };
-    let touching = options.floor.is_some() || options.self_contact.is_some();
+    let touching = options.floor.is_some() || options.between_bodies().is_some();
     let meshes = touching.then(|| Meshes::new(path, files));
     let raw = read_robot(&mut reader, document.root_element(), options, meshes);
     let Reader { findings, tally } = reader;
@@ -95,7 +95,7 @@ fn read_robot(
     if let Some(floor) = options.floor {
         floor::add(floor, &mut taken, &mut raw);
     }
-    raw.pairs = options.self_contact.map(RawPairs::new);
+    raw.pairs = options.between_bodies().map(RawPairs::new);
     for child in reader.children(node, &["link", "joint"], &IGNORED) {
         if child.tag_name().name() == "link" {
             let body = link::read(reader, child);

@@ -13,7 +13,8 @@ use crate::import::xml::{is_own, place, Reader};
 use crate::model::{ShapeSpec, SHAPES};
 use roxmltree::Node;
 
-const IDLE: &str = "a `collision` touches nothing unless a floor or contacts between bodies are asked for (`--floor`, `--self-contact` of `mbd simulate`)";
+const IDLE: &str =
+    "a `collision` touches nothing unless that is asked for (`--floor`, `--self-contact` of `mbd simulate`)";
 
 /// Reads the shapes of a link. Where nothing is asked for that they touch, there are no `meshes`, and
 /// shapes are said to touch nothing.

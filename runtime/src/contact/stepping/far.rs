@@ -246,20 +246,4 @@ where
         }
         self.look_at_end(system, [t, h]);
     }
-
-    /// What the fastest of the gaps that would be closed changes by in the step, m or rad: zero where there is none.
-    fn closing(&self, system: &WithContacts<Y>, h: Y::Scalar) -> Y::Scalar {
-        let zero = Y::Scalar::zero();
-        let all = (0..system.modes().len()).filter(|k| system.minds(*k));
-        let fastest = all.fold(zero, |most, k| {
-            let (rate, (bounces, gap, ahead)) = (system.gap_rate(k), self.closes(system, k, h));
-            let closes = rate + ahead < zero && !(bounces && gap > zero);
-            if closes && -rate > most {
-                -rate
-            } else {
-                most
-            }
-        });
-        h * fastest
-    }
 }

@@ -21,6 +21,7 @@
 //! The method is of order 1 at impacts and where slip ends, of order 2 in between. Impulses never add energy: their work is
 //! that of an impact with velocities that approach no slower. What friction holds does not move.
 
+#[cfg(feature = "hulls")]
 mod far;
 mod impulses;
 mod statistics;
@@ -37,6 +38,7 @@ use crate::lists::{copy, first, first_mut, get, get_or, part, part_mut, set};
 use crate::system::Real;
 use crate::Scalar;
 use core::marker::PhantomData;
+#[cfg(feature = "hulls")]
 use far::Far;
 use impulses::briefly;
 
@@ -81,6 +83,7 @@ pub struct TimeStepping<Y: Touching, B, I = ByRules> {
     /// What the fastest gap that closes changes by in this step, m (rad for stops of rotations).
     near: Y::Scalar,
     /// Contacts that are not looked at.
+    #[cfg(feature = "hulls")]
     far: Far<Y>,
     /// Times of the ends of the last step, s, and the state at its start.
     span: [Y::Scalar; 2],
@@ -134,6 +137,7 @@ where
             implicit: false,
             pressed: [inner.per_contact(false), inner.per_contact(false)],
             near: Y::Scalar::zero(),
+            #[cfg(feature = "hulls")]
             far: Far::new(inner),
             span: [Y::Scalar::zero(); 2],
             last: (inner.neutral(), inner.zero_momenta()),
@@ -240,6 +244,7 @@ where
             self.drift(system, t + h, half)?;
         } else {
             self.last_impulses.as_mut().fill([Y::Scalar::zero(); 3]);
+            #[cfg(feature = "hulls")]
             self.point.clear();
         }
         let free = self.post_step.idle(system, t + h);
@@ -252,11 +257,42 @@ where
         copy(self.last.1.as_mut(), p.as_ref());
         copy(q.as_mut(), self.q.as_ref());
         copy(p.as_mut(), self.p.as_ref());
+        #[cfg(feature = "hulls")]
         self.far.end(q, free.then_some(&self.point.x));
         let [last, now] = &mut self.pressed;
         self.statistics.changes += u64::from(last.as_ref() != now.as_ref());
         copy(last.as_mut(), now.as_ref());
         Ok(())
+    }
+
+    /// Looks at the contacts at the end of the step without contacts, in `self.q` and `self.p`: all of them, because leaving out
+    /// those that are far is not worth its code with few.
+    #[cfg(not(feature = "hulls"))]
+    fn look_near(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        [t, h]: [Y::Scalar; 2],
+        _: (&Y::Coordinates, &Y::Momenta),
+    ) -> bool {
+        system.look(t + h, &self.q, &self.p);
+        self.near = self.closing(system, h);
+        true
+    }
+
+    /// What the fastest of the gaps that would be closed changes by in the step, m or rad: zero where there is none.
+    fn closing(&self, system: &WithContacts<Y>, h: Y::Scalar) -> Y::Scalar {
+        let zero = Y::Scalar::zero();
+        let all = (0..system.modes().len()).filter(|k| system.minds(*k));
+        let fastest = all.fold(zero, |most, k| {
+            let (rate, (bounces, gap, ahead)) = (system.gap_rate(k), self.closes(system, k, h));
+            let closes = rate + ahead < zero && !(bounces && gap > zero);
+            if closes && -rate > most {
+                -rate
+            } else {
+                most
+            }
+        });
+        h * fastest
     }
 
     /// Whether contact `k` may bounce in the step, its gap in the middle, m or rad, and the rate at which it may close, m/s or
