@@ -75,7 +75,7 @@ fn links_of_a_robot_touch_where_that_is_asked_for() {
     let text = robot();
     let (free, findings) = read("r.urdf", &text, ImportOptions::default());
     assert!(free.contacts.is_empty());
-    assert!(findings.contains("contacts between bodies are asked for (`--floor`, `--self-contact`"), "{findings}");
+    assert!(findings.contains("touches nothing unless that is asked for (`--floor`, `--self-contact`"), "{findings}");
     let (model, findings) = read("r.urdf", &text, ImportOptions { base: Base::Floating, ..asked() });
     let wanted = [
         ("left/right", 1),
