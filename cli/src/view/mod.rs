@@ -27,10 +27,28 @@ const SCRIPTS: &[u8] = include_bytes!("page.js.lzma");
 const UNPACK: &str = include_str!("unpack.js");
 const TEMPLATE: &str = include_str!("page.html");
 
-/// A text without indents, empty lines and lines of comments.
+/// A script without comments, and without spaces and line ends that it does not need; lines with texts in them are kept.
 fn compact(text: &str) -> String {
+    const MARKS: &str = "=+-*/%&|<>?:,;(){}[]";
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//"));
-    lines.collect::<Vec<_>>().join("\n")
+    let mut out = String::new();
+    for line in lines {
+        if line.contains(['"', '`', '\'']) {
+            out = out + line + "\n";
+            continue;
+        }
+        let mut rest = line.chars().peekable();
+        while let Some(letter) = rest.next() {
+            let beside = out.ends_with(|c| MARKS.contains(c)) || rest.peek().is_some_and(|c| MARKS.contains(*c));
+            if letter != ' ' || !beside {
+                out.push(letter);
+            }
+        }
+        if !out.ends_with([';', '{', '}', ',']) {
+            out.push('\n');
+        }
+    }
+    out
 }
 
 /// Writes the page of a model, or serves an empty one on which files can be dropped.
