@@ -9,8 +9,6 @@ use mbd_runtime::hull::Polyhedron;
 use crate::field::fit;
 #[cfg(feature = "hulls")]
 use crate::hull::polyhedron;
-#[cfg(feature = "hulls")]
-use crate::inertia::dot;
 use crate::inertia::{apply, matrix};
 use crate::model::{LoopKind, Mount, Placement, ShapeKind, Value};
 
@@ -41,14 +39,14 @@ pub(super) const MOST: usize = 2000;
 /// or a polyhedron.
 pub(super) struct Rounded {
     radius: f64,
-    core: Core,
+    pub(super) core: Core,
     corners: Vec<[f64; 3]>,
     edges: Vec<Edge>,
 }
 
 /// What has faces on which corners can touch.
 #[derive(Clone, Copy)]
-enum Core {
+pub(super) enum Core {
     Line,
     /// Lengths of the edges, m.
     Box([f64; 3]),
@@ -124,26 +122,6 @@ impl Rounded {
         on(self, other) + on(other, self) + self.edges.len() * other.edges.len()
     }
 
-    /// Whether the line between two points goes through a face of the core, whose axes are those of the shape.
-    pub(super) fn is_crossed(&self, [a, b]: [[f64; 3]; 2]) -> bool {
-        match self.core {
-            Core::Line => false,
-            Core::Box(size) => (0..3).any(|k| {
-                [-0.5, 0.5].into_iter().any(|side| {
-                    let at = side * size[k];
-                    crossing([a, b], [a[k] - at, b[k] - at])
-                        .is_some_and(|p| (0..3).all(|i| i == k || p[i].abs() <= 0.5 * size[i]))
-                })
-            }),
-            #[cfg(feature = "hulls")]
-            Core::Hull(hull) => hull.faces.iter().any(|face| {
-                let above = |plane: &mbd_runtime::hull::Plane, p: [f64; 3]| dot(plane.normal, p) - plane.height;
-                crossing([a, b], [above(&face.plane, a), above(&face.plane, b)])
-                    .is_some_and(|p| face.sides.iter().all(|side| above(side, p) <= 0.0))
-            }),
-        }
-    }
-
     /// Corners on faces and edges on edges: two convex bodies with flat faces that do not overlap are as far apart as the
     /// nearest two of these. `None` where both are sharp, because the distance of two lines is never negative, so that nothing
     /// tells when they have passed through each other, and where there are too many contacts.
@@ -161,12 +139,6 @@ impl Rounded {
         }
         Some(places)
     }
-}
-
-/// Where the line between two points at these heights above a plane goes through it.
-fn crossing([a, b]: [[f64; 3]; 2], [from, to]: [f64; 2]) -> Option<[f64; 3]> {
-    let share = from / (from - to);
-    (from * to < 0.0).then(|| [0, 1, 2].map(|k| a[k] + share * (b[k] - a[k])))
 }
 
 /// Points of the rims of a cylinder, at equal distances from the x axis on: those of the lower one, then those of the upper one.
@@ -307,7 +279,7 @@ fn ends(length: f64) -> Vec<[f64; 3]> {
 }
 
 /// The corners of a box, x changing fastest.
-fn corners(size: [f64; 3]) -> Vec<[f64; 3]> {
+pub(super) fn corners(size: [f64; 3]) -> Vec<[f64; 3]> {
     let side = |corner: usize, k: usize| if corner >> k & 1 == 0 { -0.5 * size[k] } else { 0.5 * size[k] };
     (0..8).map(|corner| [0, 1, 2].map(|k| side(corner, k))).collect()
 }
@@ -343,22 +315,6 @@ pub(super) fn moved(mount: &Mount, to: [f64; 3]) -> Mount {
 mod tests {
     use super::*;
     use crate::model::Rotation;
-
-    /// A line crosses a body from side to side, or has an end inside, or passes beside it.
-    #[cfg(feature = "hulls")]
-    #[test]
-    fn lines_cross_faces() {
-        let size = [2.0, 2.0, 0.2];
-        let hull = ShapeKind::Hull { points: corners(size), rounding: 0.0 };
-        for shape in [ShapeKind::Box { size, rounding: 0.0 }, hull] {
-            let solid = Rounded::new(&shape).expect("faces");
-            for (x, wanted) in [(0.3, true), (0.9, true), (1.1, false)] {
-                assert_eq!(solid.is_crossed([[x, 0.2, -3.0], [x, 0.1, 3.0]]), wanted, "{shape:?} {x}");
-            }
-            assert!(solid.is_crossed([[0.3, 0.2, 0.0], [0.3, 0.2, 3.0]]));
-            assert!(!solid.is_crossed([[0.3, 0.2, 0.2], [0.3, 0.2, 3.0]]));
-        }
-    }
 
     /// A box has corners at the same distance from its middle; turned about z by a right angle, its x is the body's y.
     #[test]

@@ -4,8 +4,10 @@ use mbd_runtime::constrained::{close, Closing};
 use mbd_runtime::sweep::FrameState;
 use mbd_runtime::system::Constrained;
 
-use super::elementary::Rounded;
+use super::elementary::{Core, Rounded};
 use super::pairs::Candidate;
+#[cfg(feature = "hulls")]
+use crate::inertia::dot;
 use crate::inertia::{apply, transpose};
 use crate::model::{Frame, Model, ShapeKind};
 use crate::options::PlanOptions;
@@ -87,4 +89,56 @@ fn pierces([rod, solid]: [&ShapeKind; 2], [at, of]: [&FrameState<f64>; 2]) -> bo
         apply(&transpose(&of.rotation), from)
     };
     Rounded::new(solid).is_some_and(|solid| solid.is_crossed([inside(-0.5 * length), inside(0.5 * length)]))
+}
+
+impl Rounded {
+    /// Whether the line between two points goes through a face of the core, whose axes are those of the shape.
+    fn is_crossed(&self, [a, b]: [[f64; 3]; 2]) -> bool {
+        match self.core {
+            Core::Line => false,
+            Core::Box(size) => (0..3).any(|k| {
+                [-0.5, 0.5].into_iter().any(|side| {
+                    let at = side * size[k];
+                    crossing([a, b], [a[k] - at, b[k] - at])
+                        .is_some_and(|p| (0..3).all(|i| i == k || p[i].abs() <= 0.5 * size[i]))
+                })
+            }),
+            #[cfg(feature = "hulls")]
+            Core::Hull(hull) => hull.faces.iter().any(|face| {
+                let above = |plane: &mbd_runtime::hull::Plane, p: [f64; 3]| dot(plane.normal, p) - plane.height;
+                crossing([a, b], [above(&face.plane, a), above(&face.plane, b)])
+                    .is_some_and(|p| face.sides.iter().all(|side| above(side, p) <= 0.0))
+            }),
+        }
+    }
+}
+
+/// Where the line between two points at these heights above a plane goes through it.
+fn crossing([a, b]: [[f64; 3]; 2], [from, to]: [f64; 2]) -> Option<[f64; 3]> {
+    let share = from / (from - to);
+    (from * to < 0.0).then(|| [0, 1, 2].map(|k| a[k] + share * (b[k] - a[k])))
+}
+
+#[cfg(test)]
+mod tests {
+    #[cfg(feature = "hulls")]
+    use super::super::elementary::corners;
+    #[cfg(feature = "hulls")]
+    use super::*;
+
+    /// A line crosses a body from side to side, or has an end inside, or passes beside it.
+    #[cfg(feature = "hulls")]
+    #[test]
+    fn lines_cross_faces() {
+        let size = [2.0, 2.0, 0.2];
+        let hull = ShapeKind::Hull { points: corners(size), rounding: 0.0 };
+        for shape in [ShapeKind::Box { size, rounding: 0.0 }, hull] {
+            let solid = Rounded::new(&shape).expect("faces");
+            for (x, wanted) in [(0.3, true), (0.9, true), (1.1, false)] {
+                assert_eq!(solid.is_crossed([[x, 0.2, -3.0], [x, 0.1, 3.0]]), wanted, "{shape:?} {x}");
+            }
+            assert!(solid.is_crossed([[0.3, 0.2, 0.0], [0.3, 0.2, 3.0]]));
+            assert!(!solid.is_crossed([[0.3, 0.2, 0.2], [0.3, 0.2, 3.0]]));
+        }
+    }
 }

@@ -9,7 +9,7 @@ use super::overlaps::overlapping;
 use crate::import::raw::{RawModel, RawPairs};
 use crate::import::source::{Findings, Span, Spanned};
 use crate::import::taken::Taken;
-use crate::import::words::{list, quote};
+use crate::import::words::{list_of, SHOWN};
 use crate::model::{Contact, Freedom, Joint, Model, ShapeKind, Unit, Value};
 
 /// Most contacts of a pair that the file does not list: a rod and a box have 14.
@@ -20,9 +20,6 @@ const MOST: usize = 1000;
 
 /// Most contacts that are looked at for overlaps.
 const MOST_LOOKED_AT: usize = 10_000;
-
-/// Most pairs that are named for each reason.
-const SHOWN: usize = 8;
 
 /// Why pairs are left out, in the order in which this is told.
 const REASONS: [&str; 5] = [
@@ -85,7 +82,7 @@ fn too_many(findings: &mut Findings) {
     );
 }
 
-/// The pairs that were left out, by the reason.
+/// The pairs that were left out, by the reason: their number, and the first names.
 #[derive(Default)]
 struct LeftOut([(usize, Vec<String>); REASONS.len()]);
 
@@ -101,13 +98,8 @@ impl LeftOut {
     fn tell(self, findings: &mut Findings) {
         for ((n, names), reason) in self.0.into_iter().zip(REASONS).filter(|((n, _), _)| *n > 0) {
             let s = if n == 1 { "" } else { "s" };
-            let names = match n > names.len() {
-                true => {
-                    let shown: Vec<String> = names.iter().map(|name| quote(name)).collect();
-                    format!("{} and {} more", shown.join(", "), n - names.len())
-                }
-                false => list(names.iter().map(String::as_str)),
-            };
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            let names = list_of(&names, n);
             findings.notice(Span::FILE, format!("{n} pair{s} of shapes left without contacts, {reason}: {names}"));
         }
     }

@@ -18,14 +18,22 @@ fn escape(c: char) -> Vec<char> {
     }
 }
 
+/// Most names that a list shows.
+pub const SHOWN: usize = 8;
+
 /// `` `a`, `b` and `c` ``, cut off after eight.
 pub fn list<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
-    const MOST: usize = 8;
-    let quoted: Vec<String> = names.into_iter().map(quote).collect();
+    let names: Vec<&str> = names.into_iter().collect();
+    list_of(&names, names.len())
+}
+
+/// The same of `count` names, of which at least the first that are shown are given.
+pub fn list_of(names: &[&str], count: usize) -> String {
+    let quoted: Vec<String> = names.iter().take(SHOWN).map(|name| quote(name)).collect();
     match quoted.len() {
         0 => "none".into(),
+        n if count > n => format!("{} and {} more", quoted.join(", "), count - n),
         1 => quoted[0].clone(),
-        n if n > MOST => format!("{} and {} more", quoted[..MOST].join(", "), n - MOST),
         n => format!("{} and {}", quoted[..n - 1].join(", "), quoted[n - 1]),
     }
 }

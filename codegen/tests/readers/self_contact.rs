@@ -200,6 +200,48 @@ fn unknown_names_in_contact_are_told() {
     }
 }
 
+/// What is left out because it has many contacts, or because nothing can move it, is told, and pairs of the file have any number.
+#[test]
+fn many_contacts_and_rigid_pairs_are_left_out() {
+    let corner = |k: u32| {
+        let (z, angle) = ((2.0 * f64::from(k) + 1.0) / 24.0 - 1.0, 2.4 * f64::from(k));
+        let r = 0.1 * (1.0 - z * z).sqrt();
+        format!("{} {} {}", r * angle.cos(), r * angle.sin(), 0.1 * z)
+    };
+    let corners: Vec<String> = (0..24).map(corner).collect();
+    let text = |pairs: &str| {
+        format!(
+            "<mujoco><asset><mesh name='m' vertex='{}'/></asset><worldbody>\
+             <body name='a'><freejoint/><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/><geom name='pebble' type='mesh' mesh='m'/></body>\
+             <body name='b' pos='1 0 0'><freejoint/><geom name='rod' type='capsule' size='0.05 0.2'/>\
+             <geom name='knob' size='0.1' pos='0 0 1'/></body></worldbody><contact>{pairs}</contact></mujoco>",
+            corners.join(" ")
+        )
+    };
+    let (model, findings) = read("m.xml", &text("<pair geom1='rod' geom2='knob'/>"), asked());
+    assert_eq!(named(&model), ["pebble/knob"], "{findings}");
+    for told in [
+        format!("1 pair of shapes left {WITHOUT} each would be more than 32 contacts: `pebble/rod`"),
+        format!("1 pair of shapes left {WITHOUT} no freedom is between their bodies: `rod/knob`"),
+    ] {
+        assert!(findings.contains(&told), "{told}\n{findings}");
+    }
+    let (model, findings) = read("m.xml", &text("<pair geom1='pebble' geom2='rod'/>"), asked());
+    assert!(model.contacts.len() > 33, "{}\n{findings}", model.contacts.len());
+}
+
+#[test]
+fn more_than_a_thousand_contacts_are_an_error() {
+    let balls = |n: usize| {
+        let ball = |k| format!("<body pos='{k} 0 1'><freejoint/><geom size='0.1'/></body>");
+        format!("<mujoco><worldbody>{}</worldbody></mujoco>", (0..n).map(ball).collect::<String>())
+    };
+    assert_eq!(read("m.xml", &balls(45), asked()).0.contacts.len(), 990);
+    let (model, findings) = load("m.xml", &balls(46), &asked());
+    let told = "error: the shapes of the bodies have more than 1000 contacts with each other";
+    assert!(model.is_none() && findings.to_string().contains(told), "{findings}");
+}
+
 /// Bodies with several joints are no neighbours of the bodies between these, and planes of the world are touched unless
 /// there is a floor.
 #[test]

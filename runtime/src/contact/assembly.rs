@@ -81,7 +81,8 @@ pub(super) struct Shared<'a> {
 }
 
 impl Shared<'_> {
-    fn any(self) -> bool {
+    /// Whether there are such lines.
+    pub fn any(self) -> bool {
         cfg!(feature = "hulls") && !self.lines.is_empty()
     }
 }

@@ -3,8 +3,8 @@
 use alloc::vec::Vec;
 
 use super::assembly::ColumnsOf;
-use super::Contact;
-use crate::system::{Constrained, Real};
+use super::{Contact, Reducible};
+use crate::system::Real;
 
 /// Solves for momenta one after the other.
 pub(super) fn one_by_one<S: Real, P: AsMut<[S]>>(
@@ -19,13 +19,18 @@ pub(super) fn one_by_one<S: Real, P: AsMut<[S]>>(
     }
 }
 
-/// The trees on which the rows of each contact act: one tree twice where there is one. Empty where trees are not known, or where
-/// there is only one.
-pub(super) fn trees_of<Y: Constrained>(full: &Y, contacts: &[Contact<Y::Scalar>], trees: &[usize]) -> Vec<[usize; 2]> {
+/// The tree of each velocity, and the trees on which the rows of each contact act: one tree twice where there is one. The latter
+/// are empty where trees are not known, where there is only one, and where the mechanism has few bodies, so that this is not worth
+/// its code.
+pub(super) fn trees<Y: Reducible>(full: &Y, contacts: &[Contact<Y::Scalar>]) -> (Vec<usize>, Vec<[usize; 2]>) {
+    if !cfg!(feature = "hulls") {
+        return (Vec::new(), Vec::new());
+    }
+    let trees = full.trees();
     // Loops and couplings act from tree to tree as well.
     let loops = full.rows().len() > contacts.iter().map(Contact::rows).sum();
-    if !cfg!(feature = "hulls") || loops || trees.iter().all(|tree| trees.first() == Some(tree)) {
-        return Vec::new();
+    if loops || trees.iter().all(|tree| trees.first() == Some(tree)) {
+        return (trees, Vec::new());
     }
     let of = |contact: &Contact<Y::Scalar>| {
         let rows = full.rows().get(contact.row..contact.row + contact.rows()).unwrap_or(&[]);
@@ -40,5 +45,6 @@ pub(super) fn trees_of<Y: Constrained>(full: &Y, contacts: &[Contact<Y::Scalar>]
             _ => None,
         }
     };
-    contacts.iter().map(of).collect::<Option<_>>().unwrap_or_default()
+    let of = contacts.iter().map(of).collect::<Option<_>>().unwrap_or_default();
+    (trees, of)
 }

@@ -19,6 +19,7 @@ mod reach;
 mod solver;
 mod stepping;
 mod touching;
+mod travel;
 mod with_contacts;
 
 use crate::Scalar;

@@ -5,8 +5,8 @@ use alloc::vec::Vec;
 use core::ops::{Deref, DerefMut};
 
 use super::assembly::{Columns, ColumnsOf, Shared, Solved};
-use super::beside::{one_by_one, trees_of};
-use super::{rows_that_act, Contact, Mode, Reach, Touching, Way};
+use super::beside::one_by_one;
+use super::{beside, rows_that_act, Contact, Mode, Reach, Touching, Way};
 use crate::interp::{ImplicitSprings, Interpreter};
 use crate::system::{
     system_within, Conjugate, Constrained, Differentiable, Energetic, LieJoint, Real, Row, StateDerivatives, System,
@@ -163,15 +163,14 @@ impl<Y: Reducible> ModeTable<Y> {
         let open = vec![Mode::Open; contacts.len()];
         let first = full.acting(&rows_that_act(full.rows().len(), &contacts, &open));
         let (reaches, wanted) = (full.reaches(&contacts), vec![true; full.rows().len()]);
-        // Where bodies are few, it is not worth its code.
-        let trees = if cfg!(feature = "hulls") { full.trees() } else { Vec::new() };
+        let (trees, trees_of) = beside::trees(&full, &contacts);
         ModeTable {
             modes: vec![(open, first)],
             current: 0,
             reaches,
             wanted,
-            trees_of: trees_of(&full, &contacts, &trees),
             trees,
+            trees_of,
             solved: Vec::new(),
             spare: ([full.zero_momenta(), full.zero_momenta()], full.zero_rows()),
             contacts,
@@ -408,12 +407,13 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
         let ModeTable { full, modes, current, contacts, trees, trees_of, solved, spare, .. } = self;
         let (rows, entries) = (full.rows(), full.entry_columns());
         columns.merge(contacts, trees_of, solved);
-        let mut of = columns.of(contacts, rows, entries, Shared { lines: solved, trees });
+        let shared = Shared { lines: solved, trees };
+        let mut of = columns.of(contacts, rows, entries, shared);
         let current = &mut modes[*current].1;
         if current.project_several(t, q, &mut of) {
             return true;
         }
-        if !cfg!(feature = "hulls") || solved.is_empty() {
+        if !shared.any() {
             return false;
         }
         let ([p, v], sigma) = spare;

@@ -3,7 +3,6 @@
 use super::assembly::Columns;
 use super::{Contact, Mode, Way};
 use crate::constrained::rows::row;
-use crate::lists::{get, set};
 use crate::system::{Constrained, Real, Row};
 use crate::Scalar;
 
@@ -116,30 +115,6 @@ pub trait Touching: Constrained<Scalar: Real> {
         _columns: &mut Columns<Self::Scalar>,
     ) {
     }
-}
-
-/// By how much each gap can have changed, m (rad): for coordinates of the sizes `size` where the step began that have moved
-/// by up to `moved`.
-pub(super) fn travels<S: Real>(reaches: &[Reach<S>], moved: &[S], size: &[S], out: &mut [S]) {
-    let zero = S::zero();
-    // Where nothing is known, everything may have happened.
-    out.fill(S::constant(f64::INFINITY));
-    let mut contact = usize::MAX;
-    let (mut way, mut angle, mut arm) = (zero, zero, zero);
-    for reach in reaches {
-        if reach.contact != contact {
-            set(out, contact, way + angle * arm);
-            contact = reach.contact;
-            (way, angle, arm) = (zero, zero, zero);
-        }
-        let moved = get(moved, reach.velocity);
-        way = way + reach.rate * moved;
-        angle = angle + reach.turn * moved;
-        if reach.slide != zero {
-            arm = arm + reach.slide * (get(size, reach.velocity) + moved);
-        }
-    }
-    set(out, contact, way + angle * arm);
 }
 
 /// Adds row `r` of `Φ` times `factor` to a list of momenta.

@@ -2,7 +2,7 @@
 
 use super::watch::TURN;
 use super::Hybrid;
-use crate::contact::touching::travels;
+use crate::contact::travel::{next_ways, travels};
 use crate::contact::{Mode, Touching, WithContacts};
 use crate::integrate::Stepper;
 use crate::lists::{copy, get, set};
@@ -10,10 +10,9 @@ use crate::system::Real;
 use crate::Scalar;
 
 /// Number of steps over which travel is summed up at most before it is compared with the reserves; part of the number that
-/// these last, for rounding; part of the largest travel of a joint that others are taken to have at least.
+/// these last, for rounding.
 const MOST_STEPS: f64 = 1000.0;
 const ALMOST: f64 = 0.999;
-const RESTING: f64 = 0.05;
 /// How often gaps are looked at in a step, at least.
 const LOOKS: f64 = 4.0;
 /// Numbers of steps among which [`Hybrid::mind_near`] chooses.
@@ -110,10 +109,7 @@ where
         let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
         let [moved, size] = self.solver.travel(system, [true, true], false);
         copy(self.gone.as_mut(), moved.as_ref());
-        let most = moved.as_ref().iter().fold(zero, |most, x| if *x > most { *x } else { most });
-        for (allowed, moved) in self.allowed.as_mut().iter_mut().zip(self.gone.as_ref()) {
-            *allowed = *moved + Y::Scalar::constant(RESTING) * most;
-        }
+        next_ways(self.gone.as_ref(), self.allowed.as_mut());
         travels(system.system().reaches(), self.allowed.as_ref(), size.as_ref(), self.travel.as_mut());
         let each = self.reserve.as_ref().iter().zip(self.travel.as_ref()).zip(self.ignored.as_ref());
         let minded = each.filter(|(_, ignored)| !**ignored).map(|((reserve, travel), _)| *reserve / *travel);

@@ -8,7 +8,7 @@
 
 use super::{StepImpulses, TimeStepping};
 use crate::constrained::PostStep;
-use crate::contact::touching::travels;
+use crate::contact::travel::{next_ways, travels};
 use crate::contact::{Touching, WithContacts, FEW};
 use crate::lists::{copy, get, set};
 use crate::system::Real;
@@ -22,8 +22,6 @@ const SPARE: u32 = 4;
 const MARGIN: f64 = 2.0;
 /// Number of steps in which all contacts are looked at where leaving some out saves nothing.
 const PAUSE: u32 = 16;
-/// Part of the largest way of a coordinate that others are taken to move by at least.
-const RESTING: f64 = 0.05;
 /// What it costs to find how long the gap of a contact lasts, in gaps.
 const COST: f64 = 0.05;
 
@@ -95,9 +93,10 @@ impl<Y: Touching> Far<Y> {
     /// of the coordinates on the way.
     fn settle(&mut self, system: &WithContacts<Y>, size: &Y::Momenta) {
         travels(system.system().reaches(), self.gone.as_ref(), size.as_ref(), self.travel.as_mut());
-        for (k, (left, travel)) in self.left.as_mut().iter_mut().zip(self.travel.as_ref()).enumerate() {
-            *left = if system.minds(k) { system.gap(k) } else { *left - *travel };
+        for (left, travel) in self.left.as_mut().iter_mut().zip(self.travel.as_ref()) {
+            *left = *left - *travel;
         }
+        self.note(system);
         self.gone.as_mut().fill(Y::Scalar::zero());
         self.counted = true;
     }
@@ -115,9 +114,7 @@ impl<Y: Touching> Far<Y> {
         let zero = Y::Scalar::zero();
         self.margin = Y::Scalar::constant(MARGIN) * near;
         let Self { allowed, left, travel, margin, .. } = self;
-        let most = x.as_ref().iter().fold(zero, |most, x| if x.abs() > most { x.abs() } else { most });
-        let resting = Y::Scalar::constant(RESTING) * most;
-        allowed.as_mut().iter_mut().zip(x.as_ref()).for_each(|(allowed, x)| *allowed = x.abs() + resting);
+        next_ways(x.as_ref(), allowed.as_mut());
         travels(system.system().reaches(), allowed.as_ref(), size.as_ref(), travel.as_mut());
         for (lasts, left) in travel.as_mut().iter_mut().zip(left.as_ref()) {
             *lasts = (*left - *margin) / *lasts;
@@ -227,11 +224,6 @@ where
             system.look(t, q, p);
             copy(self.before.as_mut(), system.at.velocities.as_ref());
         }
-    }
-
-    fn look_at_end(&mut self, system: &mut WithContacts<Y>, [t, h]: [Y::Scalar; 2]) {
-        system.look(t + h, &self.q, &self.p);
-        self.near = self.closing(system, h);
     }
 
     fn look_at_all(

@@ -21,6 +21,7 @@
 //! The method is of order 1 at impacts and where slip ends, of order 2 in between. Impulses never add energy: their work is
 //! that of an impact with velocities that approach no slower. What friction holds does not move.
 
+mod approach;
 #[cfg(feature = "hulls")]
 mod far;
 mod impulses;
@@ -37,6 +38,7 @@ use crate::integrate::{Chart, Point};
 use crate::lists::{copy, first, first_mut, get, get_or, part, part_mut, set};
 use crate::system::Real;
 use crate::Scalar;
+use approach::middle_gap;
 use core::marker::PhantomData;
 #[cfg(feature = "hulls")]
 use far::Far;
@@ -265,71 +267,6 @@ where
         Ok(())
     }
 
-    /// Looks at the contacts at the end of the step without contacts, in `self.q` and `self.p`: all of them, because leaving out
-    /// those that are far is not worth its code with few.
-    #[cfg(not(feature = "hulls"))]
-    fn look_near(
-        &mut self,
-        system: &mut WithContacts<Y>,
-        [t, h]: [Y::Scalar; 2],
-        _: (&Y::Coordinates, &Y::Momenta),
-    ) -> bool {
-        system.look(t + h, &self.q, &self.p);
-        self.near = self.closing(system, h);
-        true
-    }
-
-    /// What the fastest of the gaps that would be closed changes by in the step, m or rad: zero where there is none.
-    fn closing(&self, system: &WithContacts<Y>, h: Y::Scalar) -> Y::Scalar {
-        let zero = Y::Scalar::zero();
-        let all = (0..system.modes().len()).filter(|k| system.minds(*k));
-        let fastest = all.fold(zero, |most, k| {
-            let (rate, (bounces, gap, ahead)) = (system.gap_rate(k), self.closes(system, k, h));
-            let closes = rate + ahead < zero && !(bounces && gap > zero);
-            if closes && -rate > most {
-                -rate
-            } else {
-                most
-            }
-        });
-        h * fastest
-    }
-
-    /// Whether contact `k` may bounce in the step, its gap in the middle, m or rad, and the rate at which it may close, m/s or
-    /// rad/s. It does not close at all before it bounces.
-    fn closes(&self, system: &WithContacts<Y>, k: usize, h: Y::Scalar) -> (bool, Y::Scalar, Y::Scalar) {
-        let (zero, rate, c) = (Y::Scalar::zero(), system.gap_rate(k), system.contact(k));
-        let gap = middle_gap(system, k, Y::Scalar::constant(0.5) * h);
-        let start = get(self.before.as_ref(), c.row);
-        // Forces alone change the rate of the gap by `rate − start` in a step.
-        let bounces = self.bounces && c.restitution > zero && start < (rate - start) + (rate - start);
-        (bounces, gap, if bounces || !(gap > zero) { zero } else { gap / h })
-    }
-
-    /// Takes the contacts into the problem that would overlap at the end of the step, and those that impulses on others
-    /// might close, with their velocities.
-    fn take(&mut self, system: &WithContacts<Y>, h: Y::Scalar) {
-        let zero = Y::Scalar::zero();
-        let mut at = 0;
-        for k in (0..system.modes().len()).filter(|k| system.minds(*k)) {
-            let (c, rate, (bounces, gap, ahead)) = (system.contact(k), system.gap_rate(k), self.closes(system, k, h));
-            self.statistics.overlap = larger(self.statistics.overlap, -gap);
-            let waits = bounces && gap > zero;
-            if waits || !(rate + ahead < zero || gap < self.near) {
-                continue;
-            }
-            self.touching.take(system, k);
-            if let Some(touch) = self.touching.problem.as_mut().get_mut(self.touching.count - 1) {
-                touch.contact.restitution = if bounces { c.restitution } else { zero };
-            }
-            for row in c.row..c.row + c.rows() {
-                let shift = if row == c.row { ahead } else { zero };
-                set(self.touching.b.as_mut(), at, get(system.at.velocities.as_ref(), row) + shift);
-                at += 1;
-            }
-        }
-    }
-
     /// Adds the impulses to the momenta `self.p` at `self.q`, where the system was looked at; the change of the velocities
     /// is in `self.v`.
     fn collide(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar) -> Result<(), HybridError> {
@@ -424,11 +361,6 @@ where
 /// Whether a step failed because impulses did not converge.
 fn unconverged(error: &HybridError) -> bool {
     matches!(error, HybridError::Contact { error: ContactError::NoConvergence { .. }, .. })
-}
-
-/// Gap of contact `k` in the middle of the step, m or rad, from gap and rate at its end without contacts.
-fn middle_gap<Y: Touching>(system: &WithContacts<Y>, k: usize, half: Y::Scalar) -> Y::Scalar {
-    system.gap(k) - half * system.gap_rate(k)
 }
 
 /// The larger of two numbers, of which the second may be none.
