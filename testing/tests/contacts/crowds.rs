@@ -4,7 +4,6 @@
 use std::time::Instant;
 
 use mbd_codegen::plan::Plan;
-
 use mbd_codegen::Options;
 use mbd_runtime::contact::{HybridError, ModeTable, Reducible, SteppingStatistics, TimeStepping, WithContacts};
 use mbd_runtime::Conjugate;
@@ -14,7 +13,8 @@ use mbd_testing::state::random_state;
 use super::far::Counted;
 use super::scene::model;
 
-/// Balls that float freely, each of which can touch each other and a floor where `pairs` is `all`, with a rod that slides out of the last ball if `rod`.
+/// Balls that float freely, each of which can touch each other and a floor where `pairs` is `all`, with a rod that slides out of
+/// the last ball if `rod`.
 fn balls(n: usize, rod: bool, pairs: &str) -> Plan {
     let mut text = format!(
         "name = \"balls\"\ngravity = [0, 0, -9.81]\n\
