@@ -42,4 +42,7 @@ for target in "$@"; do
     ) || missing=1
 done
 ls -l dist/*.whl
+for wheel in dist/*.whl; do
+    [ "$(wc -c < "$wheel")" -le 4000000 ] || { echo "$wheel is larger than 4 MB" >&2; missing=1; }
+done
 exit $missing

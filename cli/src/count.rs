@@ -49,9 +49,15 @@ struct Speed {
 /// each body, output and arithmetic, and a kilobyte for each operation.
 const UNROLLED: usize = 600;
 
+/// Whether a model has so many bodies that the operations of each output are counted once and little else: loops over like
+/// branches, speeds and parts of the scene take several times as long.
+fn is_large(plan: &Plan) -> bool {
+    plan.nodes.len() > UNROLLED
+}
+
 /// The code of an output: straight-line code, or for long chains the loops over like links that are generated.
 fn code(plan: &Plan, group: Output, options: &Options) -> Outcome<Code> {
-    let program = match plan.nodes.len() > UNROLLED {
+    let program = match is_large(plan) {
         true => compile(plan, group, options).map_err(generate::failure)?,
         false => trace(plan, group, options).map_err(generate::failure)?.map(Code::Straight),
     };
@@ -123,12 +129,21 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
         return mentioned("making the code of every set of modes", || modes::count(&plan, &options, out));
     }
     let counts = mentioned("counting the operations of every output", || all(&plan, &options))?;
-    let loops = mentioned("counting the operations of loops", || loops(&plan, &counts, &options))?;
-    let parts = match options.outputs.first() {
-        Some(&group) => mentioned("counting what parts of the scene cost", || parts(&plan, &options, group))?,
-        None => Vec::new(),
+    let loops = match is_large(&plan) {
+        true => Vec::new(),
+        false => mentioned("counting the operations of loops", || loops(&plan, &counts, &options))?,
     };
-    let speeds = mentioned("estimating the speed of every output", || speeds(&plan, &options))?;
+    let parts = match options.outputs.first() {
+        Some(&group) if !is_large(&plan) => {
+            mentioned("counting what parts of the scene cost", || parts(&plan, &options, group))?
+        }
+        _ => Vec::new(),
+    };
+    let straight = counts.iter().any(|c| !c.rolled);
+    let speeds = match is_large(&plan) && straight {
+        true => Vec::new(),
+        false => mentioned("estimating the speed of every output", || speeds(&plan, &options))?,
+    };
     if args.json {
         return as_json(&plan, &counts, &loops, &speeds, &parts, out);
     }
@@ -150,12 +165,18 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
         writeln!(out, "\nThat is straight-line code. Where links or branches are alike, loops over them are generated, whose body does for each what")?;
         writeln!(out, "one of them needs. They execute: {}", loops.join(", "))?;
     }
-    speed_table(&speeds, out)?;
+    if !speeds.is_empty() {
+        speed_table(&speeds, out)?;
+    }
     candidates(&plan, &tried, &options, args.candidates, out)?;
     rivals(&plan, &counts, out)?;
     let group = options.outputs.first().map_or("", |g| g.name());
     if !parts.is_empty() {
         writeln!(out, "\nWhat the scene costs in `{group}`:")?;
+    }
+    if is_large(&plan) {
+        writeln!(out, "\nOf more than {UNROLLED} bodies, neither parts of the scene nor loops over like branches are counted, and speeds are estimated")?;
+        writeln!(out, "of code with loops over like links only: each takes as long as these counts.")?;
     }
     for part in &parts {
         let (sign, hint) = match (part.what, part.present) {

@@ -233,9 +233,9 @@ impl<'m> Build<'_, 'm, '_> {
                 blocks.push(Block { program: b.program, inputs: b.inputs, outputs: b.outputs, repeat });
             }
         }
-        for unit in &units {
+        for (unit, results) in units.iter().zip(self.results_of(&units)) {
             match unit {
-                Unit::Straight(own) => blocks.extend(self.straight(own, &slots, &handed, unit_is_last(unit, &units))),
+                Unit::Straight(own) => blocks.extend(self.straight(own, &slots, &handed, results)),
                 Unit::Loop(event) => {
                     let event = &self.line.events[*event];
                     let Some(b) = bodies[event.run].remove(&Some(event.pass)) else { continue };
@@ -328,19 +328,45 @@ impl<'m> Build<'_, 'm, '_> {
                 }
             }
         }
+        let (mut begin, mut end) = (vec![Vec::new(); units.len()], vec![Vec::new(); units.len()]);
+        for (id, at) in born {
+            if let Some(l) = last.get(&id).filter(|l| **l > at) {
+                begin[at].push(id);
+                end[*l].push(id);
+            }
+        }
         let mut slots = BTreeMap::new();
         let (mut free, mut count) = (Vec::new(), 0);
-        for k in 0..units.len() {
-            for (id, _) in born.iter().filter(|(id, at)| **at == k && last.get(id).is_some_and(|l| *l > k)) {
+        for (begin, end) in begin.iter().zip(&end) {
+            for id in begin {
                 let slot = free.pop().unwrap_or_else(|| {
                     count += 1;
                     count - 1
                 });
                 slots.insert(*id, slot);
             }
-            free.extend(slots.iter().filter(|(id, _)| last[id] == k).map(|(_, slot)| *slot));
+            free.extend(end.iter().map(|id| slots[id]));
         }
         (count, slots)
+    }
+
+    /// Results outside runs that each unit gives; the last one also gives constants and results of loops.
+    fn results_of(&self, units: &[Unit]) -> Vec<Vec<(ProgramResult, Target)>> {
+        let mut owners = BTreeMap::new();
+        for (k, unit) in units.iter().enumerate() {
+            if let Unit::Straight(own) = unit {
+                owners.extend(own.iter().map(|id| (*id, k)));
+            }
+        }
+        let mut all = vec![Vec::new(); units.len()];
+        for (k, e) in self.results() {
+            let owner = match e {
+                Expr::Const(_) => None,
+                Expr::Node { id, .. } => owners.get(&id).copied(),
+            };
+            all[owner.unwrap_or(units.len() - 1)].push((output(e), Target::Result(k)));
+        }
+        all
     }
 
     fn straight(
@@ -348,20 +374,8 @@ impl<'m> Build<'_, 'm, '_> {
         own: &BTreeSet<u32>,
         slots: &BTreeMap<u32, usize>,
         handed: &BTreeMap<u32, Place>,
-        is_last: bool,
+        mut outputs: Vec<(ProgramResult, Target)>,
     ) -> Option<Block> {
-        let mut outputs: Vec<(ProgramResult, Target)> = Vec::new();
-        for (k, e) in self.results() {
-            let here = match e {
-                Expr::Const(_) => is_last,
-                Expr::Node { id, .. } => {
-                    own.contains(&id) || (is_last && matches!(self.line.graph.get(id).0, Op::Input(_)))
-                }
-            };
-            if here {
-                outputs.push((output(e), Target::Result(k)));
-            }
-        }
         for id in own {
             if let Some(slot) = slots.get(id) {
                 outputs.push((ProgramResult::Node(*id, false), Target::Kept(*slot)));
@@ -403,10 +417,6 @@ impl<'m> Build<'_, 'm, '_> {
             })
             .collect()
     }
-}
-
-fn unit_is_last(unit: &Unit, units: &[Unit]) -> bool {
-    units.last().is_some_and(|last| std::ptr::eq(last, unit))
 }
 
 enum Unit {

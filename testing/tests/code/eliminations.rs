@@ -134,7 +134,7 @@ fn default_eliminations_do_not_cost_accuracy() {
     let mut all = Vec::new();
     for (name, model) in models() {
         // Models that take a tenth of a second for each state are only in the report.
-        if name.starts_with("g1") || name.starts_with("20") {
+        if ["g1", "15", "20"].iter().any(|start| name.starts_with(start)) {
             continue;
         }
         let plans = [EliminationStrategy::Single, EliminationStrategy::Fastest]
@@ -143,8 +143,8 @@ fn default_eliminations_do_not_cost_accuracy() {
             let errors = measure(&plans, &[ARTICULATED, DEFAULT], states);
             beyond(&name, &ratios(&errors[1], &errors[0]))
         };
-        // The worst hundredth of 300 states are three; who is beyond the limits with them is judged by thirty.
-        all.extend(found(300).and_then(|_| found(3000)));
+        // The worst hundredth of 200 states are two; who is beyond the limits with them is judged by thirty.
+        all.extend(found(200).and_then(|_| found(3000)));
     }
     assert!(all.is_empty(), "{}", all.join("\n"));
 }

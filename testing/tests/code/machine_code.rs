@@ -110,12 +110,12 @@ fn compare_all(case: fn(u64) -> Case, seeds: u64) -> usize {
 
 #[test]
 fn trees() {
-    compare_all(tree, 40);
+    compare_all(tree, 24);
 }
 
 #[test]
 fn loops() {
-    compare_all(closed, 20);
+    compare_all(closed, 12);
 }
 
 #[test]

@@ -118,8 +118,8 @@ fn forced(seed: u64) -> Options {
 
 #[test]
 fn chains_of_revolute_joints() {
-    for seed in 0..30 {
-        let n = 5 + seed as usize % 25;
+    for seed in 0..16 {
+        let n = 5 + seed as usize * 3 % 25;
         let distribution = Distribution { bodies: (n, n), taper: 1.0, ..Distribution::default() };
         let nodes = compare(&random_model(seed, &distribution), seed, &forced(seed));
         assert!(nodes + 13 >= n, "seed {seed}: {nodes} of {n} nodes are rolled");
@@ -180,8 +180,8 @@ fn closed_chains() {
 
 #[test]
 fn rewritten_chains() {
-    for seed in 0..12 {
-        let n = 16 + seed as usize;
+    for seed in 0..6 {
+        let n = 16 + 2 * seed as usize;
         let distribution = Distribution {
             bodies: (n, n),
             taper: 1.0,
@@ -196,20 +196,20 @@ fn rewritten_chains() {
 #[test]
 fn trees_of_everything() {
     let mut nodes = 0;
-    for seed in 0..150 {
+    for seed in 0..75 {
         let all = Distribution { wrenches: 0.0, ..Distribution::everything(seed, 6 + seed as usize % 20) };
         // Nodes with parameters, mimic joints or drives stay straight-line code.
         let plain = Distribution { params: 0.0, mimic: 0.0, prescribed: 0.0, branching: 0.1, ..all.clone() };
         let distribution = if seed % 3 == 0 { all } else { plain };
         nodes += compare(&random_model(seed, &distribution), seed, &forced(seed));
     }
-    assert!(nodes > 75, "only {nodes} nodes were rolled");
+    assert!(nodes > 35, "only {nodes} nodes were rolled");
 }
 
 #[test]
 fn chains_of_one_kind() {
     let mut nodes = 0;
-    for seed in 0..120 {
+    for seed in 0..64 {
         let mut kinds = [0.0; 9];
         kinds[seed as usize % 8] = 1.0;
         let n = 4 + seed as usize % 9;
@@ -224,5 +224,5 @@ fn chains_of_one_kind() {
         };
         nodes += compare(&random_model(seed, &distribution), seed, &forced(seed));
     }
-    assert!(nodes > 200, "only {nodes} nodes were rolled");
+    assert!(nodes > 100, "only {nodes} nodes were rolled");
 }

@@ -96,7 +96,7 @@ fn time_steps_leave_out_what_is_far() {
 #[test]
 fn what_time_steps_leave_out_changes_no_random_mechanism() {
     let (mut compared, mut saved, mut touched) = (0, 0, 0);
-    for seed in 0..30 {
+    for seed in 0..12 {
         let Some(plan) = with_contacts(seed).map(|model| Plan::new(&model, 1e-9)) else { continue };
         if plan.contacts::<f64>().len() <= 8 {
             continue;
@@ -112,7 +112,7 @@ fn what_time_steps_leave_out_changes_no_random_mechanism() {
         (compared, saved, touched) = (compared + 1, saved + b.2[0] - a.2[0], touched + a.1.touched);
     }
     println!("{compared} mechanisms, {saved} rows saved, {touched} steps touched");
-    assert!(compared > 10 && saved > 1_000 && touched > 100, "{compared} {saved} {touched}");
+    assert!(compared > 4 && saved > 400 && touched > 40, "{compared} {saved} {touched}");
 }
 
 /// Least time of a step of `h` s, s, of `n` that begin at a state.

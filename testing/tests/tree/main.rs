@@ -8,4 +8,5 @@ mod derivatives;
 mod equivalence;
 mod identities;
 mod intervals;
+mod long;
 mod toml_round_trip;
