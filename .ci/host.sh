@@ -17,7 +17,7 @@ cargo build --release --manifest-path "$manifest" --target-dir "$target" --bin n
 RUSTC=/usr/bin/rustc RUSTC_BOOTSTRAP=1 CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=wasm-ld cargo build --release \
     --manifest-path "$manifest" --target-dir "$target/wasm" --lib -Zbuild-std=std,panic_abort \
     --target wasm32-unknown-unknown
-mapfile -t models < <(git ls-files 'models/*.toml' 'models/*.urdf')
+mapfile -t models < <(git ls-files 'models/*.toml' 'models/*.urdf' 'models/*.xml')
 rm -rf "$target/texts"
 mkdir -p "$target/texts/native" "$target/texts/wasm"
 "$target/release/native" "$target/texts/native" "${models[@]}"
