@@ -1,21 +1,22 @@
 //! The cases of the conformance suite, which every evaluator of programs runs: machine code at run time, C,
-//! WebAssembly. In exact arithmetic all give the bits of the program run operation by operation, which other tests hold
-//! to the interpreter.
+//! WebAssembly. All give the bits of the program run operation by operation. Other tests hold programs in exact
+//! arithmetic to the bits of the interpreter, and those in fast arithmetic to its accuracy. In fast arithmetic products and
+//! sums are rounded once where the processor can do that, and twice elsewhere ([`Case::runs`], [`Case::fused_runs`]).
 
 use mbd_codegen::code::{compile, Code};
 use mbd_codegen::generate::{chosen_frames, sizes, InputArray};
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::{search, Arithmetic, Options, Output, Precision, RolledCode};
-use mbd_runtime::system::Real;
 use mbd_runtime::trig::{sincos_f32, sincos_f64};
 
 use crate::chains::{general, planar};
 use crate::closed::{random_loops, LoopKnobs};
+use crate::fused::{Fused, Number};
 use crate::random::{random_model, Distribution, Rng};
 use crate::state::{random_state, State};
 
-/// A mechanism in a state, and options in exact arithmetic.
+/// A mechanism in a state, and options, in exact arithmetic unless they are made [`fast`](Case::fast).
 #[derive(Clone, Debug)]
 pub struct Case {
     /// What messages call it; also a valid identifier.
@@ -79,7 +80,14 @@ impl Case {
         Case { name: format!("{}_f32", self.name), options, derivatives: false, ..self }
     }
 
-    /// Its outputs with what they must give.
+    /// The same in fast arithmetic.
+    #[must_use]
+    pub fn fast(self) -> Case {
+        let options = Options { arithmetic: Arithmetic::Fast, ..self.options };
+        Case { name: format!("{}_fast", self.name), options, ..self }
+    }
+
+    /// Its outputs with what they must give. Products are rounded before they are added.
     ///
     /// # Panics
     /// If the generator refuses an output.
@@ -90,29 +98,46 @@ impl Case {
         }
     }
 
-    fn runs_in<S: Real>(&self) -> Vec<Run> {
+    /// The same where `a · b + c` of fast arithmetic is rounded once, in sines and cosines, too.
+    ///
+    /// # Panics
+    /// If the generator refuses an output.
+    pub fn fused_runs(&self) -> Vec<Run> {
+        match (self.options.arithmetic, self.options.precision) {
+            (Arithmetic::Exact, _) => self.runs(),
+            (Arithmetic::Fast, Precision::F64) => self.runs_in::<Fused<f64>>(),
+            (Arithmetic::Fast, Precision::F32) => self.runs_in::<Fused<f32>>(),
+        }
+    }
+
+    fn runs_in<S: Number>(&self) -> Vec<Run> {
         let available = Output::available(!self.plan.constraints.is_empty());
         let wanted = available.filter(|output| self.derivatives || !output.name().contains("derivatives"));
         let (p, a) = (self.state.v.iter().map(|x| 0.7 * x - 0.1).collect::<Vec<_>>(), vec![0.3; self.state.v.len()]);
         let run = |output| {
             let program = compile(&self.plan, output, &self.options).unwrap_or_else(|e| panic!("{}: {e}", self.name));
             let given: Vec<S> = self.state.inputs_of(&program.inputs, &p, &a).into_iter().map(S::constant).collect();
-            let expected = match &program.program {
-                Code::Straight(straight) => straight.evaluate(&given, |a, b, c| a * b + c),
-                Code::Rolled(rolled) => rolled.evaluate(&given, |a, b, c| a * b + c),
-            };
+            let expected = evaluate(&program.program, &given);
             let frames = chosen_frames(&self.plan, &self.options).expect("all frames").len();
             let sizes = sizes(&self.plan, &self.options, frames);
             Run {
                 output,
                 lengths: program.spec.results.iter().map(|array| array.len(&sizes)).collect(),
-                given: given.iter().map(|x| x.to_f64()).collect(),
-                expected: expected.iter().map(|x| x.to_f64()).collect(),
+                given: given.iter().map(|x| x.widened()).collect(),
+                expected: expected.iter().map(|x| x.widened()).collect(),
                 rolled: matches!(program.program, Code::Rolled(_)),
                 inputs: program.inputs,
             }
         };
         wanted.map(run).collect()
+    }
+}
+
+/// Results of a program, operation by operation.
+pub fn evaluate<S: Number>(code: &Code, given: &[S]) -> Vec<S> {
+    match code {
+        Code::Straight(program) => program.evaluate(given, S::fma),
+        Code::Rolled(program) => program.evaluate(given, S::fma),
     }
 }
 
@@ -174,6 +199,12 @@ pub fn sampled(case: fn(u64) -> Case, seeds: u64) -> Vec<Case> {
         all
     };
     (0..seeds).flat_map(of_seed).collect()
+}
+
+/// Cases in fast arithmetic: those of each kind whose programs take little time to rewrite.
+pub fn fast() -> Vec<Case> {
+    let all = [tree(5), tree(17), tree(20).single(), far(tree(21)), closed(12), chain(7)];
+    all.map(Case::fast).to_vec()
 }
 
 /// Angles on which sines are compared, rad: zeros, infinite ones, NaN, the ends of ranges, random ones over all

@@ -6,6 +6,7 @@ pub mod chains;
 pub mod closed;
 pub mod conformance;
 pub mod eliminations;
+pub mod fused;
 pub mod kkt;
 pub mod motions;
 pub mod nearest;

@@ -32,12 +32,29 @@ fn the_example_is_current_and_keeps_its_energy() {
         let sources = ["rk4.c", "double_pendulum.c"].map(|name| example.join(name));
         let program = folder.join(compiler);
         printed(Command::new(compiler).args(STRICT).args(sources).arg("-o").arg(&program));
-        let text = printed(&mut Command::new(program));
-        let change = text.split("changed by ").nth(1).and_then(|rest| rest.split(' ').next());
-        let change: f64 = change.and_then(|x| x.parse().ok()).unwrap_or_else(|| panic!("{text}"));
-        // The local error of the method is some h⁵ = 1e-15 J in each of 10,000 steps.
-        assert!(change.abs() < 1e-9, "{text}");
+        keeps_its_energy(&program);
     }
+}
+
+/// The example's program says how much its energy changes.
+fn keeps_its_energy(program: &Path) {
+    let text = printed(&mut Command::new(program));
+    let change = text.split("changed by ").nth(1).and_then(|rest| rest.split(' ').next());
+    let change: f64 = change.and_then(|x| x.parse().ok()).unwrap_or_else(|| panic!("{text}"));
+    // The local error of the method is some h⁵ = 1e-15 J in each of 10,000 steps.
+    assert!(change.abs() < 1e-9, "{text}");
+}
+
+#[test]
+fn cmake_builds_the_example() {
+    if !is_there("cmake") {
+        return;
+    }
+    let (folder, source) = (folder("c_cmake"), Path::new(ROOT).join("examples/c"));
+    let build = folder.join("build");
+    printed(Command::new("cmake").arg("-S").arg(source).arg("-B").arg(&build).arg("-DCMAKE_C_FLAGS=-Werror"));
+    printed(Command::new("cmake").arg("--build").arg(&build));
+    keeps_its_energy(&build.join("rk4"));
 }
 
 #[test]

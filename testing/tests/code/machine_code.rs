@@ -1,7 +1,8 @@
 //! Machine code made at run time against the programs that it was made of, and against the interpreter.
 //!
 //! In exact arithmetic all give the same bits, except for the signs of zeros: straight-line and rolled code, trees and
-//! loops, both precisions.
+//! loops, both precisions. In fast arithmetic machine code gives the bits of its programs, which round products and sums
+//! as the processor does.
 
 use std::collections::BTreeSet;
 #[cfg(target_arch = "x86_64")]
@@ -12,14 +13,13 @@ use mbd_codegen::model::Model;
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::{search, Arithmetic, Options, Output, Precision, RolledCode};
-#[cfg(target_arch = "x86_64")]
 use mbd_runtime::kernel::{self, Level};
 use mbd_runtime::{
     Accelerated, Conjugate, Constrained, Differentiable, Energetic, Interpreter, Packed, Scalar, System,
 };
 use mbd_testing::chains::general;
 use mbd_testing::closed::{random_loops, LoopKnobs};
-use mbd_testing::conformance::{chain, closed, exact, sampled, tree, Case};
+use mbd_testing::conformance::{chain, closed, exact, fast, sampled, tree, Case, Run};
 use mbd_testing::random::{random_model, Distribution};
 use mbd_testing::state::{random_state, State};
 use mbd_testing::toml::to_toml;
@@ -35,11 +35,19 @@ pub fn compiled<S: Number>(plan: &Plan, options: &Options, s: &State) -> Compile
     compiled
 }
 
+/// What machine code of a case must give on this processor.
+fn runs(case: &Case) -> Vec<Run> {
+    match kernel::level() {
+        Level::Plain => case.runs(),
+        _ => case.fused_runs(),
+    }
+}
+
 /// Every output of a case by machine code and by its program. Returns the number of outputs that are rolled.
 fn compare<S: Number>(case: &Case) -> usize {
     let mut machine = compiled::<S>(&case.plan, &case.options, &case.state);
     let mut rolled = 0;
-    for run in case.runs() {
+    for run in runs(case) {
         let given: Vec<Vec<S>> =
             run.arrays().into_iter().map(|array| array.iter().map(|x| S::constant(*x)).collect()).collect();
         let arguments = given.iter().zip(&run.inputs).filter(|(_, array)| !array.field);
@@ -65,7 +73,7 @@ fn compare_lanes<const L: usize>(case: &Case) {
         Err(CompileError::TooLarge { .. }) => return,
         lanes => lanes.unwrap_or_else(|e| panic!("{}: {e}", case.name)),
     };
-    for run in case.runs() {
+    for run in runs(case) {
         let packed = |array: &[f64]| -> Vec<Packed<L>> { array.iter().map(|x| Packed::constant(*x)).collect() };
         let given: Vec<Vec<Packed<L>>> = run.arrays().into_iter().map(packed).collect();
         let arguments = given.iter().zip(&run.inputs).filter(|(_, array)| !array.field);
@@ -124,6 +132,25 @@ fn rolled_code() {
     assert!(rolled > 60, "{rolled} outputs are rolled");
 }
 
+#[test]
+fn fast_arithmetic() {
+    for case in fast() {
+        match case.options.precision {
+            Precision::F64 => {
+                match best_lanes() {
+                    0..4 => {}
+                    4..8 => compare_lanes::<4>(&case),
+                    8.. => compare_lanes::<8>(&case),
+                }
+                compare::<f64>(&case);
+            }
+            Precision::F32 => {
+                compare::<f32>(&case);
+            }
+        }
+    }
+}
+
 /// The environment variable that tells [`at_a_lower_level`] the level.
 #[cfg(target_arch = "x86_64")]
 const LEVEL: &str = "MBD_TEST_LEVEL";
@@ -155,6 +182,9 @@ fn at_a_lower_level() {
     compare_all(tree, 10);
     compare_all(closed, 5);
     compare_all(chain, 4);
+    [tree(5).fast(), chain(7).fast()].iter().for_each(|case| {
+        compare::<f64>(case);
+    });
     (1150..1170).for_each(|seed| {
         fuzzed::compare(seed);
     });

@@ -1,5 +1,5 @@
-//! WebAssembly run by Node against the programs that it was made of: in exact arithmetic all bits are the same, except
-//! for the signs of zeros.
+//! WebAssembly run by Node against the programs that it was made of: all bits are the same, in exact and in fast
+//! arithmetic, except for the signs of zeros.
 
 use std::fs;
 use std::process::Command;
@@ -9,7 +9,7 @@ use mbd_codegen::options::PlanOptions;
 use mbd_codegen::plan::Plan;
 use mbd_codegen::read::{self, ImportOptions};
 use mbd_codegen::{search, wasm, Options, Output, Precision};
-use mbd_testing::conformance::{angles, chain, closed, far, sampled, sine_and_cosine, tree, Case, Run};
+use mbd_testing::conformance::{angles, chain, closed, far, fast, sampled, sine_and_cosine, tree, Case, Run};
 use mbd_testing::toml::to_toml;
 
 use crate::external::{folder, is_there, write};
@@ -128,16 +128,19 @@ fn text(run: &Run) -> String {
 /// Compares the cases of some seeds, and at every eighth also several states at once. Returns the number of outputs that
 /// are rolled, the largest number without Node.
 fn compare(test: &str, case: fn(u64) -> Case, seeds: u64) -> usize {
-    if !is_there("node") {
-        return usize::MAX;
-    }
-    let cases = sampled(case, seeds);
     let lanes = (3..seeds).step_by(8).flat_map(|seed| {
         let (case, far) = (case(seed), far(case(seed)));
         let single = [&case, &far, &case, &case].map(|case| case.clone().single()).to_vec();
         [vec![case, far], single]
     });
-    let lanes: Vec<Vec<Case>> = lanes.collect();
+    compare_cases(test, &sampled(case, seeds), &lanes.collect::<Vec<_>>())
+}
+
+/// Compares cases, and some of several states at once.
+fn compare_cases(test: &str, cases: &[Case], lanes: &[Vec<Case>]) -> usize {
+    if !is_there("node") {
+        return usize::MAX;
+    }
     let mut jobs: Vec<Job> = cases.iter().map(Job::of).collect();
     jobs.extend(lanes.iter().map(|cases| Job::lanes(&cases.iter().collect::<Vec<_>>())));
     for (job, found) in jobs.iter().zip(evaluate(test, &jobs)) {
@@ -162,6 +165,12 @@ fn loops() {
 fn rolled_code() {
     let rolled = compare("rolled", chain, 12);
     assert!(rolled > 60, "{rolled} outputs are rolled");
+}
+
+#[test]
+fn fast_arithmetic() {
+    let case = tree(5).fast();
+    compare_cases("fast", &fast(), &[vec![case.clone(), far(case)]]);
 }
 
 /// The rotation matrix of a revolute joint about z consists of the sine and the cosine. Five joints have their angles
