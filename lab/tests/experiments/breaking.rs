@@ -71,9 +71,9 @@ fn a_break_keeps_energy_and_momenta_and_the_free_part_falls() {
 
 #[test]
 fn a_breaking_chain_agrees_with_double_double_numbers() {
-    let chain = Breaking::new(12, 5, 0.001).expect("a chain");
+    let chain = Breaking::new(8, 3, 0.001).expect("a chain");
     // Double-double numbers take a hundred times as long: a shorter motion, and both runs at once.
-    let times = TIMES.map(|t| 0.35 * t);
+    let times = TIMES.map(|t| 0.3 * t);
     let precise = || chain.precise::<Wide, _>(times, accurate(1e-14), Dop853::new).expect("a run");
     let (reference, coarser) = std::thread::scope(|scope| {
         let coarser = scope.spawn(precise);

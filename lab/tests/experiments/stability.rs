@@ -39,7 +39,7 @@ fn nothing_is_lost_silently() {
         for (method, tolerance) in [(METHOD, 1e-6), (METHOD, 1e-9), ("tsit5", 1e-6), ("adams", 1e-6), ("radau5", 1e-6)]
         {
             let way = Way { method, tolerance, hold };
-            let judged = subject.judged(way, &subject.speeds(3), smooth_error(&smooth, way));
+            let judged = subject.judged(way, &subject.speeds(2), smooth_error(&smooth, way));
             assert_eq!((judged.lost, judged.capped), (0, 0), "{name} {method} {tolerance:e}: {judged:?}");
             let closed = !matches!(hold, Stabilisation::None | Stabilisation::Momenta);
             assert!(!closed || judged.refused == 0, "{name} {method} {tolerance:e}: {judged:?}");
