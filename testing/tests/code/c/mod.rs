@@ -60,8 +60,8 @@ fn call(prefix: &str, number: &str, run: &Run) -> String {
     text + "}\n"
 }
 
-/// Compares cases, which one program runs.
-fn compare(test: &str, cases: &[Case]) {
+/// Compares cases, which one program runs that is optimised at a level.
+fn compare(test: &str, level: &str, cases: &[Case]) {
     let folder = folder(test);
     let (mut includes, mut body) = (String::new(), String::new());
     let (mut sources, mut given) = (vec!["main.c".to_string()], Vec::new());
@@ -87,7 +87,7 @@ fn compare(test: &str, cases: &[Case]) {
     let main = format!("{READ_AND_WRITE}{includes}int main(void)\n{{\n{body}return 0;\n}}\n");
     write(&folder, "main.c", main);
     for compiler in compilers() {
-        let program = build(compiler, &folder, &sources, &["-O1", "-ffp-contract=off"]);
+        let program = build(compiler, &folder, &sources, &[level, "-ffp-contract=off"]);
         let found = &mut &self::run(&program, &given)[..];
         for (case, runs) in &runs {
             for run in runs {
@@ -104,14 +104,14 @@ fn trees() {
     let mut cases: Vec<Case> = (0..5).map(tree).collect();
     cases[0].derivatives = true;
     cases.extend([tree(5).fast(), tree(7).single(), far(tree(8)), far(tree(20)).single().fast()]);
-    compare("c_trees", &cases);
+    compare("c_trees", "-O1", &cases);
 }
 
 #[test]
 fn loops_and_rolled_code() {
     let mut cases = vec![closed(1), closed(12).fast(), chain(0), chain(7).fast()];
     cases.extend([closed(2).single(), chain(3).single(), far(chain(5))]);
-    compare("c_loops", &cases);
+    compare("c_loops", "-O0", &cases);
 }
 
 /// Two bodies that turn about fixed axes: entries of their rotations are the sines and cosines of the angles.
