@@ -102,6 +102,11 @@ fn counts_of_long_chains() {
     };
     let [a, b, c] = [610, 620, 640].map(total);
     assert_eq!(2 * (b - a), c - b);
+    // Nothing is counted that takes several times as long.
+    let output = good(run(&["count", &folder.join("610.toml").display().to_string(), "--outputs", "rates"]));
+    let text = out(&output);
+    assert!(text.contains("Of more than 600 bodies") && !text.contains("What the scene costs"), "{text}");
+    assert!(text.contains("critical path"), "{text}");
 }
 
 /// Where loops are generated, their operations are told beside those of straight-line code, as generated code has them.
