@@ -170,15 +170,19 @@ pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
     }
     candidates(&plan, &tried, &options, args.candidates, out)?;
     rivals(&plan, &counts, out)?;
-    let group = options.outputs.first().map_or("", |g| g.name());
-    if !parts.is_empty() {
-        writeln!(out, "\nWhat the scene costs in `{group}`:")?;
-    }
     if is_large(&plan) {
         writeln!(out, "\nOf more than {UNROLLED} bodies, neither parts of the scene nor loops over like branches are counted, and speeds are estimated")?;
         writeln!(out, "of code with loops over like links only: each takes as long as these counts.")?;
     }
-    for part in &parts {
+    part_table(&parts, options.outputs.first().map_or("", |g| g.name()), out)
+}
+
+/// The table of what parts of the scene cost in an output; nothing where none is counted.
+fn part_table(parts: &[Part], output: &str, out: &mut dyn Write) -> Outcome {
+    if !parts.is_empty() {
+        writeln!(out, "\nWhat the scene costs in `{output}`:")?;
+    }
+    for part in parts {
         let (sign, hint) = match (part.what, part.present) {
             (RIGHT_ANGLES | FORMS, _) => ('-', ""),
             (_, true) => ('+', ""),

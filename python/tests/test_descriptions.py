@@ -112,7 +112,8 @@ def mutated(text, seed):
 
 
 def test_malformed_texts_never_end_the_process():
-    names = ["double_pendulum.toml", "ur5.urdf", "mechanisms/fourbar.toml", "contacts/hopper.toml", "mjcf/hopping_leg.xml"]
+    names = ["double_pendulum.toml", "ur5.urdf", "mechanisms/fourbar.toml", "contacts/hopper.toml", "satellite.toml",
+             "mjcf/hopping_leg.xml"]
     formats = {"toml": "toml", "urdf": "urdf", "xml": "mjcf"}
     texts = [((MODELS / name).read_text(), formats[name.rsplit(".")[-1]]) for name in names]
     read = 0
