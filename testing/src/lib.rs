@@ -7,6 +7,7 @@ pub mod closed;
 pub mod conformance;
 pub mod eliminations;
 pub mod fused;
+pub mod instances;
 pub mod kkt;
 pub mod motions;
 pub mod nearest;
