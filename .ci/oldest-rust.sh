@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# The runtime builds with the oldest Rust that its manifest states: checked by building with it, where it can be had. It is
+# The runtime, the generator without machine code and WebAssembly, the macro and the facade build with the oldest Rust that their
+# manifests state: checked by building with it, where it can be had. It is
 # rustup's, if that is installed, or that of Debian 12, whose packages are unpacked under target/ and not installed. Not part of
 # `.ci/run`; `.ci/release.sh --full` runs it.
 set -euo pipefail
@@ -29,4 +30,9 @@ for features in --no-default-features "--no-default-features --features alloc" "
     # shellcheck disable=SC2086 # several words
     cargo check --quiet --locked -p mbd-runtime $features
     echo "mbd-runtime $features: builds"
+done
+for crate in "mbd-codegen --no-default-features" mbd-codegen mbd-macros "multibody --features codegen,rayon"; do
+    # shellcheck disable=SC2086
+    cargo check --quiet --locked -p $crate
+    echo "$crate: builds"
 done

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Tests the page of `mbd view` as it is committed: bits of the shipped models and broken files in Node; and as the program
-# `target/release/mbd` writes it, in Chromium, which is installed if that takes no longer than half a minute. With `--quick`,
+# `target/release/mbd` writes it, with all its controls, in Chromium, which is installed if that takes no longer than half a minute. With `--quick`,
 # which is part of `.ci/run`, a few of them. `.ci/page.sh` makes the files.
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -17,8 +17,10 @@ fi
 browser() {
     if command -v chromium > /dev/null; then
         node page/tests/browser.mjs "$PWD/target/release/mbd" "$@"
+        node page/tests/controls.mjs "$PWD/target/release/mbd"
     else
-        echo "no chromium: the page was tested in Node only"
+        echo "no chromium: the page is tested in Node only"
+        node page/tests/states.mjs
     fi
 }
 few=(models/ur5.urdf models/mechanisms/fourbar.toml models/contacts/bouncing_ball.toml)

@@ -18,6 +18,8 @@ pub mod identifiable;
 mod import;
 mod inertia;
 #[cfg(feature = "jit")]
+// What it depends on needs no older one.
+#[clippy::msrv = "1.92"]
 pub mod jit;
 #[cfg(any(feature = "height_fields", feature = "hulls"))]
 mod known;

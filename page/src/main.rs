@@ -2,16 +2,28 @@
 //! many steps of 1 ms from its start; and a hash of its generated code. A number that is none has many bits, and counts
 //! as one.
 
+use std::path::Path;
+
 use page::scene::{read, Files, Reading, Scene};
 
 use page::codegen::{generate, Options};
+
+/// The files beside a model whose names are in its text, in quotes.
+fn named(path: &Path, text: &str) -> Files {
+    let Ok(entries) = path.parent().unwrap_or(Path::new(".")).read_dir() else { return Files::new() };
+    let others = entries.flatten().filter_map(|entry| {
+        let name = entry.file_name().into_string().ok()?;
+        text.contains(&format!("\"{name}\"")).then(|| Some((name, std::fs::read(entry.path()).ok()?)))?
+    });
+    others.collect()
+}
 
 fn line(path: &str, steps: usize) -> Result<String, String> {
     let text = std::fs::read_to_string(path).map_err(|e| e.to_string())?;
     let name = path.rsplit('/').next().unwrap_or(path);
     let floating = ["solo12", "g1"].iter().any(|robot| name.contains(robot));
     let reading = Reading { floating, floor: None };
-    let (model, findings) = read(name, &text, reading, &Files::new()).map_err(|e| e.to_string())?;
+    let (model, findings) = read(name, &text, reading, &named(Path::new(path), &text)).map_err(|e| e.to_string())?;
     let mut scene = Scene::new(&model, findings)?;
     let done = scene.advance(steps);
     let (t, q, p) = scene.state();

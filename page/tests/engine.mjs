@@ -1,5 +1,5 @@
 // The engine of the page in Node, from the committed files.
-import { readFileSync } from "node:fs";
+import { readdirSync, readFileSync } from "node:fs";
 import { packed } from "../scripts.mjs";
 
 const view = new URL("../../cli/src/view/", import.meta.url), read = (name) => readFileSync(new URL(name, view));
@@ -26,6 +26,13 @@ export function hash(bytes) {
     low = product >>> 0;
   }
   return high.toString(16).padStart(8, "0") + low.toString(16).padStart(8, "0");
+}
+
+/** A model's file and those beside it whose names are in its text, in quotes: `[name, contents]` each. */
+export function filesOf(path) {
+  const at = new URL(`../../${path}`, import.meta.url), name = path.split("/").pop(), text = readFileSync(at, "utf8");
+  const others = readdirSync(new URL(".", at)).filter((other) => other !== name && text.includes(`"${other}"`));
+  return [name, ...others].map((each) => [each, readFileSync(new URL(each, at))]);
 }
 
 /** How the models of the project are read that need an option. */

@@ -1,16 +1,15 @@
 // `node states.mjs [MODELS...]`: states of the shipped models after 10,000 steps, and their generated code, have the bits of a
 // native build, which are in page/states.txt.
 import { readFileSync } from "node:fs";
-import { engine, hash, options, scriptsAreFresh } from "./engine.mjs";
+import { engine, filesOf, hash, options, scriptsAreFresh } from "./engine.mjs";
 
-const root = new URL("../../", import.meta.url);
 const only = process.argv.slice(2);
 let [checked, failed] = [0, 0];
 for (const line of readFileSync(new URL("../states.txt", import.meta.url), "utf8").trim().split("\n")) {
   const [path, ...expected] = line.split(" ");
   if (only.length && !only.includes(path)) continue;
   const page = engine(), begin = performance.now();
-  const { ok, text } = page.open(path.split("/").pop(), [[path.split("/").pop(), readFileSync(new URL(path, root))]], options(path));
+  const { ok, text } = page.open(path.split("/").pop(), filesOf(path), options(path));
   let got = text.split("\n")[0].replace(`${path.split("/").pop()}: error: `, "");
   if (ok) {
     const { nq, nv } = JSON.parse(text);

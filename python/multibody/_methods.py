@@ -71,11 +71,31 @@ def _asked(events: Any, forces: bool) -> dict:
     return {"contacts": events is True, "forces": bool(forces), "functions": functions}
 
 
+#: What arrays hold, and in which units: those of a joint that turns, then of one that slides.
+UNITS = {
+    "q": "coordinates, rad or m; quaternions are unit, (x, y, z, w)",
+    "v": "velocities, rad/s or m/s",
+    "p": "momenta, kg m²/s or kg m/s",
+    "a": "accelerations, rad/s² or m/s²",
+    "qd": "rates of the coordinates, rad/s or m/s",
+    "pd": "rates of the momenta, N m or N",
+    "tau": "joint forces, N m or N",
+    "h": "bias forces, N m or N",
+    "m": "masses, kg m² or kg",
+    "residual": "residuals of the constraints, rad or m",
+    "freed": "momenta, kg m²/s or kg m/s",
+    "sigma": "multipliers of momenta, kg m²/s or kg m/s",
+    "lambda": "multipliers, N m or N",
+    "dq": "change of the coordinates along the velocities, rad or m",
+}
+
+
 def _documentation(name: str, arguments: list, results: list, doc: str) -> str:
     def line(array: Any) -> str:
         array_name, dims = array
         single = f"{dims}," if "," not in dims else dims
-        return f"    ``{array_name}``: ``({single.lower()})`` or ``(B, {dims.lower()})``"
+        unit = f", {UNITS[array_name]}" if array_name in UNITS else ""
+        return f"    ``{array_name}``: ``({single.lower()})`` or ``(B, {dims.lower()})``{unit}"
 
     parts = [doc.replace("`", "``"), "", "Arguments:"]
     parts += [line(array) for array in arguments]
@@ -83,8 +103,10 @@ def _documentation(name: str, arguments: list, results: list, doc: str) -> str:
     parts += [line(array) for array in results]
     parts += [
         "",
-        "Angles are in rad, lengths in m, efforts in N m or N. Inputs beside the state (``tau``, ``wrenches``, ``params``, ...)",
-        "are single rows or have one row for each state. ``out`` is an array for the result, or a tuple of them.",
+        "Inputs beside the state are single rows or have one row for each state: ``tau`` (joint forces, N m or N), ``drive_q``,",
+        "``drive_v``, ``drive_a`` (prescribed coordinates, rad or m, and their rates), ``wrenches`` (``[force; moment]``, N and N m,",
+        "in the axes of their bodies or of the ground, as the description says), ``gravity`` (m/s²), ``params`` (SI units). ``out``",
+        "is an array for the result, or a tuple of them.",
     ]
     return "\n".join(parts)
 

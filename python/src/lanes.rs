@@ -6,6 +6,7 @@ use multibody::runtime::integrate::{Euler, Midpoint, Rk4, Stepper};
 use multibody::runtime::{Packed, Scalar, System};
 
 use crate::arrays::Rows;
+use crate::driver::{begin, complete, rates_tell_velocities};
 use crate::machines::set;
 use crate::rollout::{Item, Motion, State};
 use crate::rows::Beat;
@@ -131,16 +132,11 @@ impl Motion<'_> {
         }
         let mut method = method(&self.settings.method, lanes)?;
         let (h, mut written) = (Packed::constant(self.settings.dt), 0);
+        let told = rates_tell_velocities(self.settings, lanes);
         for step in 0..=self.settings.steps {
-            if step.is_multiple_of(self.settings.every) {
-                self.store_block(lanes, &mut block, &mut states, items, written);
-                written += 1;
-            }
-            if step == self.settings.steps || !beat.goes_on() {
-                break;
-            }
+            let (t, ends) = (Packed::constant(step as f64 * self.settings.dt), step == self.settings.steps);
             for (lane, (k, ..)) in items.iter().enumerate() {
-                let Some(u) = self.u else { break };
+                let (Some(u), false) = (self.u, ends) else { break };
                 let u = &u.row(*k)[step * self.sizes.1..(step + 1) * self.sizes.1];
                 let Some(layout) = self.layout else {
                     lanes.set_efforts(lane, u);
@@ -151,24 +147,30 @@ impl Motion<'_> {
                 layout.v_from(q, u, tau);
                 lanes.set_efforts(lane, tau);
             }
-            let t = Packed::constant(step as f64 * self.settings.dt);
-            method.step(lanes, t, h, &mut block.q, &mut block.p).ok()?;
+            let recorded = step.is_multiple_of(self.settings.every);
+            if recorded {
+                if told {
+                    let rates = begin(&mut *method, lanes, t, &block.q, &block.p).ok()?;
+                    block.v.copy_from_slice(&rates.x);
+                } else if !self.settings.momenta {
+                    lanes.velocities(&block.q, &block.p, &mut block.v);
+                }
+                self.store_block(&block, &mut states, items, written);
+                written += 1;
+            }
+            if ends || !beat.goes_on() {
+                break;
+            }
+            match told && recorded {
+                true => complete(&mut *method, lanes, (t, h), &mut block.q, &mut block.p).ok()?,
+                false => method.step(lanes, t, h, &mut block.q, &mut block.p).ok()?,
+            }
         }
         Some(())
     }
 
     /// Writes the states as rows of the results.
-    fn store_block<const L: usize>(
-        &self,
-        lanes: &mut CompiledLanes<L>,
-        block: &mut Block<L>,
-        states: &mut [State],
-        items: &mut [Item],
-        written: usize,
-    ) {
-        if !self.settings.momenta {
-            lanes.velocities(&block.q, &block.p, &mut block.v);
-        }
+    fn store_block<const L: usize>(&self, block: &Block<L>, states: &mut [State], items: &mut [Item], written: usize) {
         let second = if self.settings.momenta { &block.p } else { &block.v };
         let (nq, nv) = self.sizes;
         for (lane, ((_, q, v), state)) in items.iter_mut().zip(states).enumerate() {

@@ -15,7 +15,7 @@ use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::{result, writable, Given, Rows};
 use crate::contacts::{self, Touching};
-use crate::driver::Driver;
+use crate::driver::{rates_tell_velocities, Driver};
 use crate::drives::{self, Moving};
 use crate::errors::{compile_error, Failed};
 use crate::lanes::{self, AnyLanes};
@@ -267,17 +267,11 @@ impl Motion<'_> {
         let mut driver = driver.map_err(|e| failed(machine, &e))?;
         let u = self.u.map(|u| u.row(*k));
         let (nq, nv) = self.sizes;
+        let told = watcher.is_none() && self.moving.is_none() && machine.rows().is_empty();
+        let told = told && rates_tell_velocities(self.settings, machine);
         for step in 0..=self.settings.steps {
-            if step.is_multiple_of(self.settings.every) {
-                let at = *written;
-                let t = step as f64 * self.settings.dt;
-                self.store(machine, t, &mut state, &mut q[at * nq..(at + 1) * nq], &mut v[at * nv..(at + 1) * nv]);
-                *written += 1;
-            }
-            if step == self.settings.steps {
-                break;
-            }
-            if let Some(u) = u {
+            let (t, ends) = (step as f64 * self.settings.dt, step == self.settings.steps);
+            if let (Some(u), false) = (u, ends) {
                 let u = &u[step * nv..(step + 1) * nv];
                 let tau = &mut machine.inputs().tau;
                 match self.layout {
@@ -285,10 +279,24 @@ impl Motion<'_> {
                     Some(layout) => layout.v_from(&state.q, u, tau),
                 }
             }
-            let (settings, driven) = (self.settings, u.is_some());
+            let recorded = step.is_multiple_of(self.settings.every);
+            if recorded {
+                let at = *written;
+                let (q, v) = (&mut q[at * nq..(at + 1) * nq], &mut v[at * nv..(at + 1) * nv]);
+                match told {
+                    true => driver.begin(machine, t, &mut state).map_err(|e| failed(machine, &e))?,
+                    false => self.find_velocities(machine, t, &mut state),
+                }
+                self.write(&state, q, v);
+                *written += 1;
+            }
+            if ends {
+                break;
+            }
+            let (settings, input) = (self.settings, (u.is_some(), told && recorded));
             let go_on = match &mut watcher {
-                None => driver.step(settings, machine, step, driven, &mut state, beat),
-                Some(watcher) => driver.step_to_event(settings, machine, step, driven, &mut state, watcher),
+                None => driver.step(settings, machine, step, input, &mut state, beat),
+                Some(watcher) => driver.step_to_event(settings, machine, step, input.0, &mut state, watcher),
             };
             let raised = watcher.as_mut().and_then(|watcher| {
                 self.told.events(*k, watcher.events.drain(..));
@@ -338,10 +346,19 @@ impl Motion<'_> {
 
     /// Writes the state at time `t` as a row of the result.
     pub fn store(&self, machine: &mut Compiled, t: f64, state: &mut State, q: &mut [f64], v: &mut [f64]) {
+        self.find_velocities(machine, t, state);
+        self.write(state, q, v);
+    }
+
+    fn find_velocities(&self, machine: &mut Compiled, t: f64, state: &mut State) {
         if !self.settings.momenta {
             machine.drive_to(t);
             machine.velocities(&state.q, &state.p, &mut state.v);
         }
+    }
+
+    /// Writes a state whose velocities are known as a row of the result.
+    fn write(&self, state: &State, q: &mut [f64], v: &mut [f64]) {
         let second = if self.settings.momenta { &state.p } else { &state.v };
         match self.layout {
             None => {

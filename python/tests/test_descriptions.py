@@ -2,7 +2,9 @@
 
 import pickle
 import random
+import time
 
+import numpy as np
 import pytest
 from conftest import MODELS
 
@@ -116,14 +118,23 @@ def test_malformed_texts_never_end_the_process():
              "mjcf/hopping_leg.xml"]
     formats = {"toml": "toml", "urdf": "urdf", "xml": "mjcf"}
     texts = [((MODELS / name).read_text(), formats[name.rsplit(".")[-1]]) for name in names]
-    read = 0
+    read = moved = 0
     for seed in range(1000):
         text, format = texts[seed % len(texts)]
+        text, begin = mutated(text, seed), time.process_time()
         try:
-            model = multibody.load(text=mutated(text, seed), format=format, search=False)
+            model = multibody.load(text=text, format=format, search=False)
         except multibody.ModelError as error:
             assert error.findings
-            continue
-        read += 1
-        assert model.nv == len(model.velocity_names)
-    assert read > 10
+            assert any(finding.severity == "error" for finding in multibody.check(text=text, format=format)), seed
+        else:
+            read += 1
+            assert model.nv == len(model.velocity_names)
+            q, v = model.start()
+            assert np.shape(model.momenta(q, v)) == (model.nv,)
+            motion = model.rollout((q, v), dt=1e-3, steps=5, on_error="mark")
+            # What fails says so, and what does not has numbers.
+            moved += not motion.failures
+            assert motion.failures or np.isfinite(motion.q).all(), seed
+        assert time.process_time() - begin < 10, seed
+    assert read > 10 and moved > 5

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+import zlib
 
 import numpy as np
 import pytest
@@ -39,6 +40,24 @@ def test_models_are_pickled_as_texts(arm, robot, tmp_path):
     text = pickle.dumps(multibody.load(tmp_path / "over.toml", search=False))
     (tmp_path / "base.urdf").unlink()
     assert pickle.loads(text).nv == 6
+
+
+def test_a_worker_reads_a_model_once(arm, monkeypatch):
+    text, loads = zlib.compress(pickle.dumps(arm)), []
+    read = pickle.loads
+    monkeypatch.setattr(many.pickle, "loads", lambda text: loads.append(text) or read(text))
+    assert many._model(text) is many._model(text) and len(loads) == 1
+    # The least recently used one goes first.
+    # Bytes after its end do not change a text.
+    others = [text + bytes([k]) for k in range(many.KEPT)]
+    monkeypatch.setattr(many.zlib, "decompress", lambda text: zlib.decompressobj().decompress(text))
+    for other in others[: many.KEPT - 1]:
+        many._model(other)
+    many._model(text)
+    assert len(loads) == many.KEPT
+    many._model(others[-1])
+    assert text in many._models and others[0] not in many._models and len(many._models) == many.KEPT
+    many._models.clear()
 
 
 def test_blocks_change_no_bit(arm, pool):

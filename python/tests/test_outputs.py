@@ -1,5 +1,7 @@
 """Outputs: identities, batches, arguments."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from conftest import MODELS, states
@@ -43,14 +45,48 @@ def test_frames_and_jacobians(arm):
     np.testing.assert_allclose(velocity, frames.velocity, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["arm", "robot"])
-def test_rows_are_single_states_bit_for_bit(name, request):
-    model = request.getfixturevalue(name)
-    q, v = states(model, 4)
-    tau = np.random.default_rng(2).uniform(-1, 1, (4, model.nv))
-    all_rows = model.accelerations(q, v, tau=tau)
-    for k in range(4):
-        assert (model.accelerations(q[k], v[k], tau=tau[k]) == all_rows[k]).all()
+@pytest.mark.parametrize("rows", [4, 101])
+@pytest.mark.parametrize("name", ["arm", "robot", "linkage", "contacts", "parameters"])
+def test_rows_are_single_states_bit_for_bit(name, rows, request):
+    """From 64 rows on several states are computed side by side."""
+    files = {"contacts": "contacts/quadruped.toml", "parameters": "double_pendulum.toml"}
+    model = multibody.load(MODELS / files[name]) if name in files else request.getfixturevalue(name)
+    q, v = states(model, rows)
+    random = np.random.default_rng(2)
+    a = random.uniform(-1, 1, (rows, model.nv))
+    given = {"q": q, "v": v, "a": a, "p": model.momenta(q, v)}
+    arguments = {name: [array for array, _ in given] for name, given, _, _ in multibody._native.outputs()}
+    inputs = {"tau": random.uniform(-1, 1, (rows, model.nv))}
+    if model.parameter_defaults.size:
+        inputs["params"] = model.parameter_defaults * random.uniform(0.9, 1.1, (rows, model.parameter_defaults.size))
+    assert set(model.outputs) >= {"rates", "energy", "frames", "reactions", "regressor", "centroidal", "derivatives"}
+    for output in model.outputs:
+        of_all = model.evaluate(output, *(given[x] for x in arguments[output]), **inputs)
+        for k in (0, 1, 3, rows - 1):
+            single = model.evaluate(
+                output, *(given[x][k] for x in arguments[output]), **{name: of_each[k] for name, of_each in inputs.items()}
+            )
+            pairs = zip(of_all, single) if isinstance(single, tuple) else [(of_all, single)]
+            for many, one in pairs:
+                assert many[k].tobytes() == one.tobytes(), f"{output}, row {k}"
+
+
+def test_arrays_are_read_and_written_without_copies(arm):
+    """NumPy tells `tracemalloc` of its memory: a million bytes of results and two of arguments, but none allocated."""
+    q, v = states(arm, 20_000)
+    out = np.empty_like(v)
+    arm.momenta(q[:100], v[:100])
+    tracemalloc.start()
+    try:
+        arm.momenta(q, v, out=out)
+        assert tracemalloc.get_traced_memory()[1] < 100_000
+        arm.momenta(q, v)
+        assert out.nbytes <= tracemalloc.get_traced_memory()[1] < out.nbytes + 100_000
+        # Anything but contiguous doubles is copied.
+        arm.momenta(q.astype(np.float32), v, out=out)
+        assert tracemalloc.get_traced_memory()[1] > q.nbytes
+    finally:
+        tracemalloc.stop()
 
 
 def test_single_rows_hold_for_all(arm):

@@ -47,9 +47,13 @@ def test_the_stubs_are_those_of_the_table():
     assert make_stubs.text() == (PACKAGE / "__init__.pyi").read_text()
 
 
-def test_outputs_are_methods_with_shapes_in_their_documentation():
-    for name, arguments, results, _ in multibody.outputs():
+def test_outputs_are_methods_with_shapes_and_units_in_their_documentation():
+    for name, arguments, results, doc in multibody.outputs():
         method = getattr(multibody.Model, name)
+        units = multibody._methods.UNITS
+        assert all(f"{units[a]}\n" in method.__doc__ for a, _ in arguments)
+        # What is not in the table of units is described above.
+        assert all(r in units or len(doc) > 20 for r, _ in results)
         assert list(inspect.signature(method).parameters)[1 : 1 + len(arguments)] == [a for a, _ in arguments]
         assert all(f"``{r}``" in method.__doc__ for r, _ in results)
 
@@ -120,6 +124,33 @@ def test_vectors_of_environments():
     single = multibody.gym.make(pendulum, **settings)
     single.reset(seed=1)
     assert single.step(np.ones(2))[0].shape == (4,)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("file", ["mechanisms/fourbar.toml", "satellite.toml", "ur5_tool.toml"])
+def test_environments_of_loops_prescribed_joints_and_parameters(file):
+    """Loops stay closed, and parameters may differ from row to row."""
+    pytest.importorskip("gymnasium")
+    from gymnasium.utils.env_checker import check_env
+
+    model = multibody.load(MODELS / file, search=False)
+    params = None
+    if model.parameter_defaults.size:
+        params = model.parameter_defaults * np.array([[1.0], [1.0], [1.1]])
+    settings = dict(reward=lambda state: np.square(state.v).sum(axis=1), frame_skip=5)
+    check_env(multibody.gym.make(model, **settings), skip_render_check=True)
+    q, v = model.start()
+    start = model.close(q), v
+    envs = multibody.gym.make_vec(model, num_envs=3, reset=lambda random, rows: start, params=params, **settings)
+    envs.reset(seed=1)
+    actions = np.full((3, *envs.single_action_space.shape), 0.1)
+    for _ in range(20):
+        observations, rewards, terminated, truncated, _ = envs.step(actions)
+        assert not terminated.any() and not truncated.any() and np.isfinite(rewards).all()
+    assert (observations[0] == observations[1]).all()
+    assert (observations[0] != observations[2]).any() == (params is not None)
+    if "constraint_residuals" in model.outputs:
+        assert abs(model.constraint_residuals(observations[:, : model.nq]).residual).max() < 1e-9
 
 
 @pytest.mark.filterwarnings("ignore")
