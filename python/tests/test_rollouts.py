@@ -102,6 +102,22 @@ def test_momenta_and_velocities(robot):
     assert (joined.q == by_v.q).all()
 
 
+@pytest.mark.parametrize("method", ["euler", "rk4", "semi-implicit-euler", "tsit5", "gauss4"])
+def test_recorded_velocities(arm, method):
+    """Where the rates of a step tell them, too, they are those of the momenta, at every instant, however many are kept, and for rows
+    that are computed one by one or together."""
+    q, v = states(arm, 5)
+    u = np.random.default_rng(3).uniform(-1, 1, (5, 12, arm.nv))
+    by_p = arm.rollout((q, arm.momenta(q, v)), u, dt=1e-3, state="momenta", method=method)
+    by_v = arm.rollout((q, v), u, dt=1e-3, method=method)
+    assert (by_v.q == by_p.q).all()
+    np.testing.assert_allclose(by_v.v, [arm.velocities(*row) for row in zip(by_p.q, by_p.v)], rtol=1e-11, atol=1e-12)
+    some = arm.rollout((q, v), u, dt=1e-3, method=method, every=4)
+    assert (some.v == by_v.v[:, ::4]).all() and (some.q == by_v.q[:, ::4]).all()
+    alone = arm.rollout((q[2], v[2]), u[2, :8], dt=1e-3, method=method)
+    assert (alone.v == by_v.v[2, :9]).all() and (alone.q == by_v.q[2, :9]).all()
+
+
 @pytest.mark.parametrize("layout", ["pinocchio", "mujoco"])
 def test_layouts(robot, layout):
     q, v = states(robot, 4)
