@@ -179,7 +179,7 @@ impl<S: Scalar> Interpreter<S> {
 
     /// `(q, p) → (v, q̇, ṗ)`.
     pub fn rates(&mut self, q: &[S], p: &[S], v: &mut [S], qd: &mut [S], pd: &mut [S]) {
-        if self.plain {
+        if S::IS_NATIVE && self.plain {
             let sweeps = Sweeps { tree: &self.tree, trace: &Plain };
             return sweeps.rates(q, p, &inputs!(self), &mut self.work, v, qd, pd);
         }

@@ -9,6 +9,9 @@ use core::ops::{Add, Div, Mul, Neg, Sub};
 pub trait Scalar:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
+    /// Whether the processor itself computes with these numbers. Then the interpreter has a second copy of the rates, for
+    /// [plain](crate::tree::Tree::is_plain) trees; others would gain little by what takes long to compile.
+    const IS_NATIVE: bool = false;
     /// A constant, rounded to the precision of the type.
     fn constant(x: f64) -> Self;
     /// A constant with more digits than a double, rounded to the precision of the type.
@@ -70,6 +73,7 @@ fn entry(x: f64, table: &[f64], offset: usize) -> f64 {
 }
 
 impl Scalar for f64 {
+    const IS_NATIVE: bool = true;
     #[inline]
     fn constant(x: f64) -> Self {
         x
@@ -108,6 +112,7 @@ impl Scalar for f64 {
 }
 
 impl Scalar for f32 {
+    const IS_NATIVE: bool = true;
     #[inline]
     fn constant(x: f64) -> Self {
         x as f32

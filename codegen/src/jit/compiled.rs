@@ -57,7 +57,7 @@ pub struct Compiled<S: Number = f64> {
     pub(super) asks: bool,
     /// Calls of each of [`Output::ALL`], counted up to that number.
     calls: Vec<u32>,
-    params: Vec<S>,
+    pub(super) params: Vec<S>,
     /// 1 for each row that acts, 0 for one that does not, where that is an input.
     pub(super) acts: Vec<S>,
     pub(super) scratch: Vec<S>,
@@ -310,7 +310,7 @@ impl<S: Number> Compiled<S> {
     ) -> bool {
         let done = self.shared.made(output).filter(|_| !self.waits(output)).is_some_and(|code| {
             let results = results.each_mut().map(|result| &mut **result);
-            code.call_lean(arguments, &self.interpreter.tau, results, &mut self.scratch)
+            code.call_lean(arguments, (&self.interpreter.tau, &self.params), results, &mut self.scratch)
         });
         done || self.run_any(output, arguments, results)
     }

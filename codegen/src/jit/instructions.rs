@@ -61,6 +61,9 @@ pub fn width(precision: Precision, lanes: usize) -> usize {
     }
 }
 
+/// Place of the parameters among them.
+pub const PARAMETERS: usize = ARGUMENTS + 5;
+
 /// Place of each input array in the table of inputs.
 pub fn input_places(inputs: &[InputArray]) -> Vec<usize> {
     let mut arguments = 0..ARGUMENTS;
@@ -459,5 +462,15 @@ impl Instructions for Writer<'_> {
         self.b.ins().brif(done, open.exit, &ends, open.header, &again);
         self.b.switch_to_block(open.exit);
         self.b.block_params(open.exit).to_vec()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_have_their_place() {
+        assert_eq!(FIELDS[PARAMETERS - ARGUMENTS].array.name, "params");
     }
 }

@@ -26,7 +26,7 @@ use cranelift::jit::{JITBuilder, JITModule};
 use cranelift::module::{default_libcall_names, Linkage, Module};
 use cranelift::prelude::*;
 
-use super::instructions::{input_places, width, write, Shape, ARGUMENTS, BLOCK, INPUTS};
+use super::instructions::{input_places, width, write, Shape, ARGUMENTS, BLOCK, INPUTS, PARAMETERS};
 use super::vectors::{self, Width};
 use super::{CompileError, Compiled};
 use crate::code::Code;
@@ -124,8 +124,9 @@ pub struct MachineCode<S> {
     entry: Entry<S>,
     /// Lengths of the input arrays; those that it does not have are empty.
     inputs: [usize; INPUTS],
-    /// Whether fields other than the first one are among them.
+    /// Whether fields other than the first one are among them, and others than that and the parameters.
     more: bool,
+    others: bool,
     /// Number and lengths of the result arrays; those that it does not have are empty.
     results: (usize, [usize; RESULTS]),
     /// Length of the working memory.
@@ -271,7 +272,9 @@ impl<S: Number> MachineCode<S> {
         for (array, place) in program.inputs.iter().zip(input_places(&program.inputs)) {
             inputs[place] = lanes * array.len();
         }
-        let more = inputs[ARGUMENTS + 1..].iter().any(|len| *len > 0);
+        let reads = |place: &usize| inputs[*place] > 0;
+        let more = (ARGUMENTS + 1..INPUTS).any(|place| reads(&place));
+        let others = (ARGUMENTS + 1..INPUTS).filter(|place| *place != PARAMETERS).any(|place| reads(&place));
         let mut lengths = [0; RESULTS];
         lengths.iter_mut().zip(&results).for_each(|(to, len)| *to = lanes * len);
         let results = (results.len(), lengths);
@@ -280,6 +283,7 @@ impl<S: Number> MachineCode<S> {
             entry,
             inputs,
             more,
+            others,
             results,
             scratch: lanes * body.scratch + padding::<S>(),
             size: body.size,
@@ -343,21 +347,25 @@ impl<S: Number> MachineCode<S> {
         unsafe { (self.entry)(read.as_ptr().cast(), written.as_ptr().cast(), aligned(scratch)) == 0 }
     }
 
-    /// Runs code for one state that reads no other field than joint forces. Returns whether it did: not if it reads others, or
-    /// a slice or the working memory has another length; [`call`](Self::call) tells which. A call of a small function takes as
-    /// long as its code, so that there is one way out, and nothing is in memory before it but what the code reads.
+    /// Runs code for one state that reads no other field than joint forces and parameters. Returns whether it did: not if it
+    /// reads others, or a slice or the working memory has another length; [`call`](Self::call) tells which. A call of a small
+    /// function takes as long as its code, so that there is one way out, and nothing is in memory before it but what the code
+    /// reads.
     #[inline(always)]
     pub fn call_lean<const N: usize>(
         &self,
         arguments: [&[S]; ARGUMENTS],
-        tau: &[S],
+        (tau, params): (&[S], &[S]),
         results: [&mut [S]; N],
         scratch: &mut [S],
     ) -> bool {
         let [a, b, c] = arguments;
         let inputs = [a, b, c, tau];
         let (count, lengths) = &self.results;
-        let mut wrong = usize::from(self.more) | (N ^ count);
+        let mut wrong = usize::from(self.others) | (N ^ count);
+        if self.more {
+            wrong |= params.len() ^ self.inputs[PARAMETERS];
+        }
         for (array, len) in inputs.iter().zip(&self.inputs) {
             wrong |= array.len() ^ len;
         }
@@ -370,6 +378,9 @@ impl<S: Number> MachineCode<S> {
         let mut read = [const { MaybeUninit::uninit() }; INPUTS + 1];
         for (to, array) in read.iter_mut().zip(inputs) {
             to.write(array.as_ptr());
+        }
+        if self.more {
+            read[PARAMETERS].write(params.as_ptr());
         }
         read[INPUTS].write(self.numbers);
         let written = results.map(<[S]>::as_mut_ptr);

@@ -41,7 +41,7 @@ impl<S: Number> System for Compiled<S> {
         let code = self.shared.made(Output::Rates).filter(|_| !self.waits(Output::Rates) && self.drives.is_none());
         let done = code.is_some_and(|code| {
             // The vectors are looked into last, which leaves more registers.
-            code.call_lean([q, p, &[]], &self.interpreter.tau, [qd, pd], &mut self.scratch)
+            code.call_lean([q, p, &[]], (&self.interpreter.tau, &self.params), [qd, pd], &mut self.scratch)
         });
         if !done {
             self.any_rates(t, q, p, qd, pd);
