@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
 # The runtime, the generator without machine code and WebAssembly, the macro and the facade build with the oldest Rust that their
-# manifests state: checked by building with it, where it can be had. It is
-# rustup's, if that is installed, or that of Debian 12, whose packages are unpacked under target/ and not installed. Not part of
-# `.ci/run`; `.ci/release.sh --full` runs it.
+# manifests state: checked by building with it, where it can be had. It is rustup's, if that is installed, or that of Debian 12,
+# whose packages are unpacked under target/ and not installed. Not part of `.ci/run`; `.ci/release.sh --full` runs it.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 oldest=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' runtime/Cargo.toml)

@@ -13,7 +13,10 @@ fn named(path: &Path, text: &str) -> Files {
     let Ok(entries) = path.parent().unwrap_or(Path::new(".")).read_dir() else { return Files::new() };
     let others = entries.flatten().filter_map(|entry| {
         let name = entry.file_name().into_string().ok()?;
-        text.contains(&format!("\"{name}\"")).then(|| Some((name, std::fs::read(entry.path()).ok()?)))?
+        if !text.contains(&format!("\"{name}\"")) {
+            return None;
+        }
+        Some((name, std::fs::read(entry.path()).ok()?))
     });
     others.collect()
 }

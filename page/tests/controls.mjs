@@ -187,9 +187,11 @@ async function motion() {
   const untraced = await page.state("untraced");
   await page.evaluate("(() => { const e = [...document.querySelectorAll('[data-part=Picture] select')][0]; e.value = String(page.scene.frames.length - 1); e.dispatchEvent(new Event('change')); })()");
   claim((await page.state("path")) !== untraced && (await page.evaluate("tracePoints().length")) > 50, "the path of a frame is drawn");
+  const fixed = await page.of("canvas.view.at");
   await page.key("f");
-  const followed = await page.evaluate("new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => resolve(page.look.follow && canvas.view.at.every(Number.isFinite)))))");
-  claim(followed, "F follows the mechanism");
+  await page.state("followed");
+  const followed = await page.of("canvas.view.at");
+  claim((await page.evaluate("page.look.follow")) && followed.every(Number.isFinite) && followed.join() !== fixed.join(), "F follows the mechanism");
   const names = "(() => { const c = $('names'), d = c.getContext('2d').getImageData(0, 0, c.width, c.height - 200).data; return d.some((x) => x > 0); })()";
   await page.state("names");
   const withNames = await page.evaluate(names);

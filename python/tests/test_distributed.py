@@ -47,8 +47,7 @@ def test_a_worker_reads_a_model_once(arm, monkeypatch):
     read = pickle.loads
     monkeypatch.setattr(many.pickle, "loads", lambda text: loads.append(text) or read(text))
     assert many._model(text) is many._model(text) and len(loads) == 1
-    # The least recently used one goes first.
-    # Bytes after its end do not change a text.
+    # Texts that differ in bytes behind their ends, which are not read. Of too many, the one goes that was used the longest time ago.
     others = [text + bytes([k]) for k in range(many.KEPT)]
     monkeypatch.setattr(many.zlib, "decompress", lambda text: zlib.decompressobj().decompress(text))
     for other in others[: many.KEPT - 1]:

@@ -49,7 +49,7 @@ def test_frames_and_jacobians(arm):
 @pytest.mark.parametrize("name", ["arm", "robot", "linkage", "contacts", "parameters"])
 def test_rows_are_single_states_bit_for_bit(name, rows, request):
     """From 64 rows on several states are computed side by side."""
-    files = {"contacts": "contacts/quadruped.toml", "parameters": "double_pendulum.toml"}
+    files = {"contacts": "contacts/quadruped.toml", "parameters": "ur5_tool.toml"}
     model = multibody.load(MODELS / files[name]) if name in files else request.getfixturevalue(name)
     q, v = states(model, rows)
     random = np.random.default_rng(2)
@@ -57,6 +57,7 @@ def test_rows_are_single_states_bit_for_bit(name, rows, request):
     given = {"q": q, "v": v, "a": a, "p": model.momenta(q, v)}
     arguments = {name: [array for array, _ in given] for name, given, _, _ in multibody._native.outputs()}
     inputs = {"tau": random.uniform(-1, 1, (rows, model.nv))}
+    assert (model.parameter_defaults.size > 0) == (name == "parameters")
     if model.parameter_defaults.size:
         inputs["params"] = model.parameter_defaults * random.uniform(0.9, 1.1, (rows, model.parameter_defaults.size))
     assert set(model.outputs) >= {"rates", "energy", "frames", "reactions", "regressor", "centroidal", "derivatives"}

@@ -26,6 +26,9 @@ const MOST_INLINE: usize = 16;
 /// Number of input arrays of every function.
 pub const INPUTS: usize = ARGUMENTS + FIELDS.len();
 
+/// Place of the parameters in the table of inputs.
+pub const PARAMETERS: usize = ARGUMENTS + 5;
+
 /// What the body of a function depends on besides its program.
 pub struct Shape<'a> {
     /// The number type.
@@ -60,9 +63,6 @@ pub fn width(precision: Precision, lanes: usize) -> usize {
         _ => 1,
     }
 }
-
-/// Place of the parameters among them.
-pub const PARAMETERS: usize = ARGUMENTS + 5;
 
 /// Place of each input array in the table of inputs.
 pub fn input_places(inputs: &[InputArray]) -> Vec<usize> {

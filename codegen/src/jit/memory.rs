@@ -124,8 +124,9 @@ pub struct MachineCode<S> {
     entry: Entry<S>,
     /// Lengths of the input arrays; those that it does not have are empty.
     inputs: [usize; INPUTS],
-    /// Whether fields other than the first one are among them, and others than that and the parameters.
+    /// Whether fields other than the first one are among them.
     more: bool,
+    /// Whether fields other than the first one and the parameters are among them.
     others: bool,
     /// Number and lengths of the result arrays; those that it does not have are empty.
     results: (usize, [usize; RESULTS]),
@@ -272,9 +273,9 @@ impl<S: Number> MachineCode<S> {
         for (array, place) in program.inputs.iter().zip(input_places(&program.inputs)) {
             inputs[place] = lanes * array.len();
         }
-        let reads = |place: &usize| inputs[*place] > 0;
-        let more = (ARGUMENTS + 1..INPUTS).any(|place| reads(&place));
-        let others = (ARGUMENTS + 1..INPUTS).filter(|place| *place != PARAMETERS).any(|place| reads(&place));
+        let mut read = (ARGUMENTS + 1..INPUTS).filter(|place| inputs[*place] > 0);
+        let more = read.clone().next().is_some();
+        let others = read.any(|place| place != PARAMETERS);
         let mut lengths = [0; RESULTS];
         lengths.iter_mut().zip(&results).for_each(|(to, len)| *to = lanes * len);
         let results = (results.len(), lengths);
