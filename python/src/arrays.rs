@@ -5,10 +5,12 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PySlice, PyTuple};
 
+use crate::memory;
+
 /// Number of entries from which on arrays for results begin where JAX takes them without a copy: at a multiple of so many
 /// bytes. Copies of shorter ones take less time than the care for that.
 const MANY: usize = 512;
-const ALIGNMENT: usize = 64;
+pub const ALIGNMENT: usize = 64;
 
 /// An array of one or of many rows that a caller gave.
 pub struct Given<'py> {
@@ -122,6 +124,7 @@ pub fn result<'py>(
         let total = shape.iter().try_fold(1_usize, |all, n| all.checked_mul(*n));
         return match total {
             Some(total) if total < MANY => Ok(PyArrayDyn::zeros(py, shape.to_vec(), false)),
+            Some(total) if (memory::LARGE..=memory::KEPT).contains(&total) => memory::zeros(py, shape, total),
             _ => aligned(py, shape, total),
         };
     };

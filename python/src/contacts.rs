@@ -12,7 +12,6 @@ use multibody::runtime::contact::{
 use multibody::runtime::integrate::{AutoSwitch, Dop853, Radau5, Rk4, Step, StepError, Stepper, Tolerances};
 
 use crate::errors::Failed;
-use crate::machines::set;
 use crate::rollout::{Item, Motion};
 use crate::rows::Beat;
 use crate::settings::Settings;
@@ -62,8 +61,8 @@ impl Touching {
     /// Gives these of the fields their defaults again, after a call that has set them.
     pub fn reset(&mut self, fields: impl Iterator<Item = usize>, defaults: &[Vec<f64>]) {
         let Some(table) = &mut self.table else { return };
-        fields.for_each(|field| set(table, field, &defaults[field]));
-        table.inputs().tau.fill(0.0);
+        fields.for_each(|field| table.set_field(field, &defaults[field]));
+        table.efforts().fill(0.0);
     }
 }
 
@@ -103,12 +102,12 @@ impl Motion<'_> {
             None => touching.take(),
             Some((field, rows)) => {
                 let mut full = touching.full.clone();
-                set(&mut full, *field, rows.row(k));
+                full.set_field(*field, rows.row(k));
                 ModeTable::new(full, touching.contacts.clone())
             }
         };
-        others.iter().for_each(|(field, rows)| set(&mut table, *field, rows.row(k)));
-        table.inputs().tau.fill(0.0);
+        others.iter().for_each(|(field, rows)| table.set_field(*field, rows.row(k)));
+        table.efforts().fill(0.0);
         table
     }
 
@@ -116,7 +115,7 @@ impl Motion<'_> {
     fn drive(&self, k: usize, step: usize, q: &[f64], system: &mut System) {
         let Some(u) = self.u else { return };
         let u = &u.row(k)[step * self.sizes.1..(step + 1) * self.sizes.1];
-        let tau = &mut system.system_mut().inputs().tau;
+        let tau = system.system_mut().efforts();
         match self.layout {
             None => tau.copy_from_slice(u),
             Some(layout) => layout.v_from(q, u, tau),

@@ -9,7 +9,7 @@ use pyo3::types::PyTuple;
 use crate::arrays::{result, writable, Given, Rows};
 use crate::errors::compile_error;
 use crate::lanes::AnyLanes;
-use crate::machines::{set, Inputs, Machines};
+use crate::machines::{Inputs, Machines};
 
 /// Number of states from which on other threads of Python may run meanwhile.
 const MANY: usize = 64;
@@ -91,7 +91,7 @@ impl Work<'_> {
         }
         let lengths: Vec<usize> = rest.iter().map(|all| all.len() / self.count.max(1)).collect();
         for k in 0..self.count {
-            self.fields.iter().for_each(|(field, rows)| set(machine, *field, rows.row(k)));
+            self.fields.iter().for_each(|(field, rows)| machine.set_field(*field, rows.row(k)));
             let arguments: Vec<&[f64]> = self.arguments.iter().map(|rows| rows.row(k)).collect();
             let mut results: Vec<_> = rest.iter_mut().zip(&lengths).map(|(all, len)| first(all, *len)).collect();
             machine.evaluate_or_interpret(self.output, &arguments, &mut results)?;

@@ -7,7 +7,6 @@ use multibody::runtime::{Packed, Scalar, System};
 
 use crate::arrays::Rows;
 use crate::driver::{begin, complete, rates_tell_velocities};
-use crate::machines::set;
 use crate::rollout::{Item, Motion, State};
 use crate::rows::Beat;
 
@@ -81,6 +80,18 @@ struct Block<const L: usize> {
     v: Vec<Packed<L>>,
 }
 
+/// States that are kept before they are written: each row then gets a run of its memory at once.
+const KEPT: usize = 16;
+
+/// The last of the states that are recorded, one after the other: coordinates, and velocities or momenta.
+struct Record<const L: usize> {
+    q: Vec<Packed<L>>,
+    second: Vec<Packed<L>>,
+    /// Number of states that it holds, and of those that are written.
+    kept: usize,
+    written: usize,
+}
+
 fn pack<const L: usize>(lanes: &mut [Packed<L>], lane: usize, from: &[f64]) {
     lanes.iter_mut().zip(from).for_each(|(to, from)| to.0[lane] = *from);
 }
@@ -116,8 +127,8 @@ impl Motion<'_> {
         let mut block = Block { q: lanes.neutral(), p: lanes.zero_momenta(), v: lanes.zero_momenta() };
         let mut states = Vec::with_capacity(L);
         for (lane, (k, ..)) in items.iter().enumerate() {
-            self.fields.iter().for_each(|(field, rows)| set(machine, *field, rows.row(*k)));
-            machine.inputs().tau.fill(0.0);
+            self.fields.iter().for_each(|(field, rows)| machine.set_field(*field, rows.row(*k)));
+            machine.efforts().fill(0.0);
             let state = self.begin(machine, *k).ok()?;
             // Lengths of quaternions are only seen of the first lane.
             self.check_units(machine, &state.q).ok()?;
@@ -131,7 +142,7 @@ impl Motion<'_> {
             states.push(state);
         }
         let mut method = method(&self.settings.method, lanes)?;
-        let (h, mut written) = (Packed::constant(self.settings.dt), 0);
+        let (h, mut record) = (Packed::constant(self.settings.dt), Record::new(&block));
         let told = rates_tell_velocities(self.settings, lanes);
         for step in 0..=self.settings.steps {
             let (t, ends) = (Packed::constant(step as f64 * self.settings.dt), step == self.settings.steps);
@@ -155,8 +166,10 @@ impl Motion<'_> {
                 } else if !self.settings.momenta {
                     lanes.velocities(&block.q, &block.p, &mut block.v);
                 }
-                self.store_block(&block, &mut states, items, written);
-                written += 1;
+                record.keep(&block.q, if self.settings.momenta { &block.p } else { &block.v });
+                if record.kept == KEPT {
+                    self.write_rows(&mut record, &mut states, items);
+                }
             }
             if ends || !beat.goes_on() {
                 break;
@@ -166,28 +179,46 @@ impl Motion<'_> {
                 false => method.step(lanes, t, h, &mut block.q, &mut block.p).ok()?,
             }
         }
+        self.write_rows(&mut record, &mut states, items);
         Some(())
     }
 
-    /// Writes the states as rows of the results.
-    fn store_block<const L: usize>(&self, block: &Block<L>, states: &mut [State], items: &mut [Item], written: usize) {
-        let second = if self.settings.momenta { &block.p } else { &block.v };
+    /// Writes the states that are kept to the rows of the results.
+    fn write_rows<const L: usize>(&self, record: &mut Record<L>, states: &mut [State], items: &mut [Item]) {
         let (nq, nv) = self.sizes;
+        let (first, end) = (record.written, record.written + record.kept);
         for (lane, ((_, q, v), state)) in items.iter_mut().zip(states).enumerate() {
-            let (q, v) = (&mut q[written * nq..(written + 1) * nq], &mut v[written * nv..(written + 1) * nv]);
-            match self.layout {
-                None => {
-                    unpack(&block.q, lane, q);
-                    unpack(second, lane, v);
-                }
-                Some(layout) => {
-                    unpack(&block.q, lane, &mut state.q);
-                    unpack(second, lane, &mut state.v);
-                    layout.q_to(&state.q, q);
-                    layout.v_to(&state.q, &state.v, v);
-                }
+            let (q, v) = (&mut q[first * nq..end * nq], &mut v[first * nv..end * nv]);
+            let Some(layout) = self.layout else {
+                unpack(&record.q, lane, q);
+                unpack(&record.second, lane, v);
+                continue;
+            };
+            let kept = record.q.chunks(state.q.len().max(1)).zip(record.second.chunks(state.v.len().max(1)));
+            for ((q, v), kept) in q.chunks_mut(nq.max(1)).zip(v.chunks_mut(nv.max(1))).zip(kept) {
+                unpack(kept.0, lane, &mut state.q);
+                unpack(kept.1, lane, &mut state.v);
+                layout.q_to(&state.q, q);
+                layout.v_to(&state.q, &state.v, v);
             }
         }
+        (record.kept, record.written) = (0, end);
+    }
+}
+
+impl<const L: usize> Record<L> {
+    /// With memory for states of this length.
+    fn new(of: &Block<L>) -> Self {
+        let memory = |len: usize| vec![Packed::zero(); KEPT * len];
+        Record { q: memory(of.q.len()), second: memory(of.v.len()), kept: 0, written: 0 }
+    }
+
+    /// Keeps a state; there is room for it.
+    fn keep(&mut self, q: &[Packed<L>], second: &[Packed<L>]) {
+        let (n, m) = (q.len(), second.len());
+        self.q[self.kept * n..(self.kept + 1) * n].copy_from_slice(q);
+        self.second[self.kept * m..(self.kept + 1) * m].copy_from_slice(second);
+        self.kept += 1;
     }
 }
 

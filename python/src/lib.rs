@@ -10,6 +10,7 @@ mod evaluate;
 mod generate;
 mod lanes;
 mod machines;
+mod memory;
 mod model;
 mod read;
 mod rollout;

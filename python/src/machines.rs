@@ -79,8 +79,8 @@ impl Machines {
         machine.set_drives(None);
         machine.restore_row_order();
         let drives = FIELDS.iter().enumerate().filter(|(_, field)| ["drive_q", "drive_v"].contains(&field.array.name));
-        fields.chain(drives.map(|(at, _)| at)).for_each(|field| set(&mut machine, field, &self.defaults[field]));
-        machine.inputs().tau.fill(0.0);
+        fields.chain(drives.map(|(at, _)| at)).for_each(|field| machine.set_field(field, &self.defaults[field]));
+        machine.efforts().fill(0.0);
         self.pool.lock().unwrap_or_else(PoisonError::into_inner).push(machine);
     }
 
@@ -120,28 +120,6 @@ impl Machines {
             self.prepared.fetch_or(bit, Ordering::Relaxed);
         }
         Ok(())
-    }
-}
-
-/// Sets one of [`FIELDS`].
-pub fn set(machine: &mut Compiled, field: usize, row: &[f64]) {
-    let name = FIELDS[field].array.name;
-    if name == "params" {
-        // Other numbers make another tree for the interpreter.
-        if machine.parameters() != row {
-            machine.set_parameters(row);
-        }
-        return;
-    }
-    let inputs = machine.inputs();
-    match name {
-        "tau" => inputs.tau.copy_from_slice(row),
-        "drive_q" => inputs.drive_q.copy_from_slice(row),
-        "drive_v" => inputs.drive_v.copy_from_slice(row),
-        "drive_a" => inputs.drive_a.copy_from_slice(row),
-        "wrenches" => inputs.wrenches.as_flattened_mut().copy_from_slice(row),
-        "gravity" => inputs.gravity.copy_from_slice(row),
-        _ => {}
     }
 }
 

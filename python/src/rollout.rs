@@ -19,7 +19,7 @@ use crate::driver::{rates_tell_velocities, Driver};
 use crate::drives::{self, Moving};
 use crate::errors::{compile_error, Failed};
 use crate::lanes::{self, AnyLanes};
-use crate::machines::{set, Inputs, Machines};
+use crate::machines::{Inputs, Machines};
 use crate::model::Model;
 use crate::rows::{on_threads, Beat};
 use crate::settings::Settings;
@@ -235,8 +235,8 @@ impl Motion<'_> {
     fn row(&self, memory: &mut Memory, mut item: Item, beat: &mut Beat) -> Result<(), Failed> {
         let Memory { machine, touching, .. } = memory;
         machine.restore_row_order();
-        self.fields.iter().for_each(|(field, rows)| set(machine, *field, rows.row(item.0)));
-        machine.inputs().tau.fill(0.0);
+        self.fields.iter().for_each(|(field, rows)| machine.set_field(*field, rows.row(item.0)));
+        machine.efforts().fill(0.0);
         if let Some(moving) = self.moving {
             drives::follow(machine, self.settings.dt, moving, item.0);
         }
@@ -273,7 +273,7 @@ impl Motion<'_> {
             let (t, ends) = (step as f64 * self.settings.dt, step == self.settings.steps);
             if let (Some(u), false) = (u, ends) {
                 let u = &u[step * nv..(step + 1) * nv];
-                let tau = &mut machine.inputs().tau;
+                let tau = machine.efforts();
                 match self.layout {
                     None => tau.copy_from_slice(u),
                     Some(layout) => layout.v_from(&state.q, u, tau),

@@ -1,5 +1,6 @@
 //! A mechanism whose functions are machine code made at run time.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -48,7 +49,10 @@ pub struct Compiled<S: Number = f64> {
     ///
     /// [`Constrained::reorder_rows`]: mbd_runtime::Constrained::reorder_rows
     planned: Option<Arc<Shared<S>>>,
+    /// Holds the inputs, too.
     pub(super) interpreter: Interpreter<S>,
+    /// Whether its tree has the parameters of before: it is made again when it is to compute something.
+    outdated: bool,
     /// Whether the interpreter computes everything.
     pub(super) interpreted: bool,
     /// Number of calls of an output that the interpreter computes before the output is compiled.
@@ -180,6 +184,7 @@ impl<S: Number> Compiled<S> {
             shared,
             planned: None,
             interpreter,
+            outdated: false,
             interpreted: false,
             patience: 0,
             asks: false,
@@ -224,7 +229,7 @@ impl<S: Number> Compiled<S> {
     /// The inputs beside the state: `tau`, `drive_q`, `drive_v`, `drive_a`, `wrenches`, `gravity`. They must keep their
     /// lengths. Gravity is read only where the model says that it is an input.
     pub fn inputs(&mut self) -> &mut Interpreter<S> {
-        &mut self.interpreter
+        self.interpreting()
     }
 
     /// The parameters, in the order of the model.
@@ -237,14 +242,31 @@ impl<S: Number> Compiled<S> {
     /// # Panics
     /// If there is another number of them than the model has.
     pub fn set_parameters(&mut self, params: &[S]) {
+        self.outdated |= self.params != params;
         self.params.copy_from_slice(params);
-        self.set_interpreter(params);
     }
 
-    /// Makes the interpreter of the plan with parameters, and the inputs that it has now.
-    fn set_interpreter(&mut self, params: &[S]) {
+    /// The interpreter with the parameters of now.
+    pub(super) fn interpreting(&mut self) -> &mut Interpreter<S> {
+        if self.outdated {
+            self.interpreter = self.new_interpreter();
+            self.outdated = false;
+        }
+        &mut self.interpreter
+    }
+
+    /// The same of a mechanism that does not change.
+    fn current(&self) -> Cow<'_, Interpreter<S>> {
+        match self.outdated {
+            true => Cow::Owned(self.new_interpreter()),
+            false => Cow::Borrowed(&self.interpreter),
+        }
+    }
+
+    /// The interpreter of the plan with the parameters and the inputs of now.
+    fn new_interpreter(&self) -> Interpreter<S> {
         let old = &self.interpreter;
-        let mut new = self.shared.plan.interpreter(params);
+        let mut new = self.shared.plan.interpreter(&self.params);
         new.tau.clone_from(&old.tau);
         new.drive_q.clone_from(&old.drive_q);
         new.drive_v.clone_from(&old.drive_v);
@@ -253,7 +275,7 @@ impl<S: Number> Compiled<S> {
         if self.shared.plan.model.gravity == Gravity::Input {
             new.gravity = old.gravity;
         }
-        self.interpreter = new;
+        new
     }
 
     /// Compiles an output now, in place of at its first call.
@@ -360,7 +382,7 @@ impl<S: Number> Compiled<S> {
             return false;
         }
         let mut plan = self.shared.plan.clone();
-        if !plan.reorder_rows(&RowProducts::new(&mut self.interpreter, q)) {
+        if !plan.reorder_rows(&RowProducts::new(self.interpreting(), q)) {
             return false;
         }
         let options = self.shared.options.clone();
@@ -384,9 +406,8 @@ impl<S: Number> Compiled<S> {
 
     /// Takes the interpreter of the plan that the code has now.
     fn code_has_changed(&mut self) {
-        let params = std::mem::take(&mut self.params);
-        self.set_interpreter(&params);
-        self.params = params;
+        self.interpreter = self.new_interpreter();
+        self.outdated = false;
         self.calls.fill(0);
     }
 
@@ -397,8 +418,8 @@ impl<S: Number> Compiled<S> {
         let make = || Arc::new(Shared::new(plan.acting(acts), options.clone(), *sizes));
         let mut reduced = reduced.lock().unwrap_or_else(PoisonError::into_inner);
         let shared = reduced.entry(acts.to_vec()).or_insert_with(make).clone();
-        let interpreter = self.interpreter.acting(acts);
-        Compiled { shared, planned: None, interpreter, calls: vec![0; self.calls.len()], ..self.clone() }
+        let (interpreter, calls) = (self.current().acting(acts), vec![0; self.calls.len()]);
+        Compiled { shared, planned: None, interpreter, outdated: false, calls, ..self.clone() }
     }
 
     /// `q̇ = N(q) v`.
@@ -437,7 +458,7 @@ impl<S: Number> Reducible for Compiled<S> {
     }
 
     fn reaches(&self, contacts: &[Contact<S>]) -> Vec<Reach<S>> {
-        self.interpreter.tree().reaches(contacts)
+        self.current().tree().reaches(contacts)
     }
 
     fn trees(&self) -> Vec<usize> {
@@ -446,7 +467,7 @@ impl<S: Number> Reducible for Compiled<S> {
 
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
         if !self.run(Output::Gaps, [q, v, &[]], [gaps, velocities, entries]) {
-            self.interpreter.gaps(q, v, gaps, velocities, entries);
+            self.interpreting().gaps(q, v, gaps, velocities, entries);
         }
     }
 
@@ -464,18 +485,26 @@ impl<S: Number> Reducible for Compiled<S> {
         entries: &mut Vec<S>,
     ) {
         if !self.run(Output::Gaps, [q, v, &[]], [gaps, velocities, entries]) {
-            self.interpreter.gaps_of(wanted, (q, v), gaps, velocities, entries);
+            self.interpreting().gaps_of(wanted, (q, v), gaps, velocities, entries);
         }
     }
 
     fn with_implicit_springs(&self, step: S) -> Option<ImplicitSprings<Self, Vec<S>>> {
-        let found = self.interpreter.with_implicit_springs(step)?;
+        let (found, outdated) = (self.current().with_implicit_springs(step)?, false);
         let Shared { plan, options, sizes, implicit, .. } = &*self.shared;
         let params = [&self.params[..], &[step]].concat();
         let sizes = Sizes { params: params.len(), ..*sizes };
         let make = || Arc::new(Shared::new(plan.with_implicit_springs(), options.clone(), sizes));
         let (shared, calls) = (implicit.get_or_init(make).clone(), vec![0; self.calls.len()]);
-        Some(found.map(|interpreter| Compiled { shared, planned: None, interpreter, params, calls, ..self.clone() }))
+        Some(found.map(|interpreter| Compiled {
+            shared,
+            planned: None,
+            interpreter,
+            outdated,
+            params,
+            calls,
+            ..self.clone()
+        }))
     }
 
     fn project_several(&mut self, t: S, q: &Vec<S>, columns: &mut ColumnsOf<S>) -> bool {

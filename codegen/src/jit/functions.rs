@@ -13,7 +13,7 @@ impl<S: Number> Compiled<S> {
         if self.run(Output::Rates, [q, p, &[]], [qd, pd]) {
             self.velocities(q, p, v);
         } else {
-            self.interpreter.rates(q, p, v, qd, pd);
+            self.interpreting().rates(q, p, v, qd, pd);
         }
     }
 
@@ -23,7 +23,7 @@ impl<S: Number> Compiled<S> {
     /// If a slice has another length than the mechanism has coordinates or velocities.
     pub fn velocities(&mut self, q: &[S], p: &[S], v: &mut [S]) {
         if !self.run(Output::Velocities, [q, p, &[]], [v]) {
-            self.interpreter.velocities(q, p, v);
+            self.interpreting().velocities(q, p, v);
         }
     }
 
@@ -33,7 +33,7 @@ impl<S: Number> Compiled<S> {
     /// As [`Compiled::velocities`].
     pub fn bias(&mut self, q: &[S], v: &[S], h: &mut [S]) {
         if !self.run(Output::Bias, [q, v, &[]], [h]) {
-            self.interpreter.bias(q, v, h);
+            self.interpreting().bias(q, v, h);
         }
     }
 
@@ -45,7 +45,7 @@ impl<S: Number> Compiled<S> {
         let mut energy = [S::zero(); 2];
         match self.run(Output::Energy, [q, p, &[]], [&mut energy]) {
             true => (energy[0], energy[1]),
-            false => self.interpreter.energy(q, p),
+            false => self.interpreting().energy(q, p),
         }
     }
 
@@ -55,7 +55,7 @@ impl<S: Number> Compiled<S> {
     /// As [`Compiled::velocities`].
     pub fn momenta(&mut self, q: &[S], v: &[S], p: &mut [S]) {
         if !self.run(Output::Momenta, [q, v, &[]], [p]) {
-            self.interpreter.momenta(q, v, p);
+            self.interpreting().momenta(q, v, p);
         }
     }
 
@@ -65,7 +65,7 @@ impl<S: Number> Compiled<S> {
     /// As [`Compiled::velocities`].
     pub fn accelerations(&mut self, q: &[S], v: &[S], a: &mut [S]) {
         if !self.run(Output::Accelerations, [q, v, &[]], [a]) {
-            self.interpreter.accelerations(q, v, a);
+            self.interpreting().accelerations(q, v, a);
         }
     }
 
@@ -75,7 +75,7 @@ impl<S: Number> Compiled<S> {
     /// As [`Compiled::velocities`].
     pub fn inverse_dynamics(&mut self, q: &[S], v: &[S], a: &[S], tau: &mut [S]) {
         if !self.run(Output::InverseDynamics, [q, v, a], [tau]) {
-            self.interpreter.inverse_dynamics(q, v, a, tau);
+            self.interpreting().inverse_dynamics(q, v, a, tau);
         }
     }
 
@@ -85,7 +85,7 @@ impl<S: Number> Compiled<S> {
     /// As [`Compiled::velocities`].
     pub fn mass_matrix(&mut self, q: &[S], m: &mut [S]) {
         if !self.run(Output::MassMatrix, [q, &[], &[]], [m]) {
-            self.interpreter.mass_matrix(q, m);
+            self.interpreting().mass_matrix(q, m);
         }
     }
 }

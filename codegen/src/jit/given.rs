@@ -4,6 +4,8 @@ use mbd_runtime::Interpreter;
 
 use super::instructions::{ARGUMENTS, INPUTS};
 use super::memory::{Inputs, MachineCode, Number};
+use super::Compiled;
+use crate::output::FIELDS;
 
 /// What machine code of one state reads: arguments, the inputs of an interpreter, parameters, and the rows that act.
 pub(super) struct Given<'a, S: Number> {
@@ -40,5 +42,31 @@ impl<S: Number> Inputs<S> for Given<'_, S> {
         let Interpreter { drive_q, drive_v, drive_a, wrenches, gravity, .. } = self.inputs;
         let gravity = if self.reads_gravity { &gravity[..] } else { &[] };
         [drive_q, drive_v, drive_a, wrenches.as_flattened(), self.params, self.acts, gravity]
+    }
+}
+
+impl<S: Number> Compiled<S> {
+    /// The joint forces, N m or N. [`Compiled::inputs`] has them, too, but makes the interpreter anew after other parameters.
+    pub fn efforts(&mut self) -> &mut [S] {
+        &mut self.interpreter.tau
+    }
+
+    /// Sets a field of the functions ([`FIELDS`], by its number); which rows act cannot be set.
+    ///
+    /// # Panics
+    /// If it has another length.
+    pub fn set_field(&mut self, field: usize, row: &[S]) {
+        let inputs = &mut self.interpreter;
+        let to = match FIELDS[field].array.name {
+            "params" => return self.set_parameters(row),
+            "tau" => &mut inputs.tau[..],
+            "drive_q" => &mut inputs.drive_q,
+            "drive_v" => &mut inputs.drive_v,
+            "drive_a" => &mut inputs.drive_a,
+            "wrenches" => inputs.wrenches.as_flattened_mut(),
+            "gravity" => &mut inputs.gravity,
+            _ => return,
+        };
+        to.copy_from_slice(row);
     }
 }

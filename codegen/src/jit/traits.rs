@@ -14,7 +14,7 @@ impl<S: Number> Compiled<S> {
     fn any_rates(&mut self, t: S, q: &Vec<S>, p: &Vec<S>, qd: &mut Vec<S>, pd: &mut Vec<S>) {
         self.drive_to(t);
         if !self.run_any(Output::Rates, [q, p, &[]], [qd, pd]) {
-            self.interpreter.rates_at(t, q, p, qd, pd);
+            self.interpreting().rates_at(t, q, p, qd, pd);
         }
     }
 }
@@ -108,7 +108,7 @@ impl<S: Number> Differentiable for Compiled<S> {
         }
         self.copies = copies;
         if !compiled {
-            self.interpreter.rate_derivatives(t, q, p, out);
+            self.interpreting().rate_derivatives(t, q, p, out);
         }
     }
 }
@@ -135,7 +135,7 @@ impl<S: Number> Constrained for Compiled<S> {
 
     fn constraint_residuals(&mut self, q: &Vec<S>, residual: &mut Vec<S>, jacobian: &mut Vec<S>) {
         if !self.run(Output::ConstraintResiduals, [q, &[], &[]], [residual, jacobian]) {
-            self.interpreter.constraint_residuals(q, residual, jacobian);
+            self.interpreting().constraint_residuals(q, residual, jacobian);
         }
     }
 
@@ -148,20 +148,20 @@ impl<S: Number> Constrained for Compiled<S> {
         let compiled = self.run(Output::ProjectMomenta, arguments, [v, p, sigma]);
         self.copies = augmented;
         if !compiled {
-            self.interpreter.project_momenta(t, q, p, v, sigma);
+            self.interpreting().project_momenta(t, q, p, v, sigma);
         }
     }
 
     fn position_correction(&mut self, q: &Vec<S>, residual: &mut Vec<S>, dq: &mut Vec<S>, pivots: &mut Vec<S>) {
         if !self.run(Output::PositionCorrection, [q, &[], &[]], [residual, dq, pivots]) {
-            self.interpreter.position_correction(q, residual, dq, pivots);
+            self.interpreting().position_correction(q, residual, dq, pivots);
         }
     }
 
     fn multipliers(&mut self, t: S, q: &Vec<S>, v: &Vec<S>, lambda: &mut Vec<S>) {
         self.drive_to(t);
         if !self.run(Output::Multipliers, [q, v, &[]], [lambda]) {
-            self.interpreter.multipliers(t, q, v, lambda);
+            self.interpreting().multipliers(t, q, v, lambda);
         }
     }
 
