@@ -51,6 +51,7 @@ impl<const L: usize> Neg for Packed<L> {
 }
 
 impl<const L: usize> Scalar for Packed<L> {
+    const LANES: usize = L;
     #[inline]
     fn constant(x: f64) -> Self {
         Packed([x; L])

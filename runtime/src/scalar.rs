@@ -12,6 +12,8 @@ pub trait Scalar:
     /// Whether the processor itself computes with these numbers. Then the interpreter has a second copy of the rates, for
     /// [plain](crate::tree::Tree::is_plain) trees; others would gain little by what takes long to compile.
     const IS_NATIVE: bool = false;
+    /// How many numbers one of these stands for: as many as the lanes of [`Packed`](crate::Packed), otherwise one.
+    const LANES: usize = 1;
     /// A constant, rounded to the precision of the type.
     fn constant(x: f64) -> Self;
     /// A constant with more digits than a double, rounded to the precision of the type.

@@ -2,6 +2,7 @@
 
 use super::chart::Point;
 use crate::constant::Constant;
+use crate::kernel::{call_lanes, Arithmetic, Kernel};
 use crate::system::System;
 use crate::Scalar;
 
@@ -27,12 +28,43 @@ const NARROW: bool = cfg!(target_feature = "avx");
 /// either.
 #[inline(always)]
 pub(super) fn combine<Y: System>(
-    mut out: [&mut [Y::Scalar]; 2],
+    out: [&mut [Y::Scalar]; 2],
     start: Option<Start<Y::Scalar>>,
     h: Y::Scalar,
     weights: &[(usize, Constant)],
     k: &[Point<Y>],
 ) {
+    if Y::Scalar::LANES > 1 {
+        call_lanes::<OfLanes, 0, LANES, f64, Sums<Y>>((out, start, h, weights, k));
+    } else {
+        all((out, start, h, weights, k));
+    }
+}
+
+/// The arguments of [`combine`].
+type Sums<'a, Y> = (
+    [&'a mut [<Y as System>::Scalar]; 2],
+    Option<Start<'a, <Y as System>::Scalar>>,
+    <Y as System>::Scalar,
+    &'a [(usize, Constant)],
+    &'a [Point<Y>],
+);
+
+/// [`combine`] of numbers that stand for many: compiled for the instructions of the processor, as generated code is.
+struct OfLanes;
+
+/// Doubles of the longest vectors.
+const LANES: usize = 8;
+
+impl<Y: System> Kernel<0, LANES, Sums<'_, Y>> for OfLanes {
+    #[inline(always)]
+    fn run<A: Arithmetic>(sums: Sums<Y>) {
+        all(sums);
+    }
+}
+
+#[inline(always)]
+fn all<Y: System>((mut out, start, h, weights, k): Sums<Y>) {
     let mut at = 0;
     while !NARROW && some::<Y, 4>(&mut out, at, start, h, weights, k) {
         at += 4;
