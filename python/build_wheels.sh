@@ -38,6 +38,8 @@ for target in "$@"; do
             echo "$target: no standard library; install it with: rustup target add $target" >&2
             exit 1
         }
+        # Tables for unwinding the stack, of which nothing makes use where a panic ends the program.
+        export RUSTFLAGS="${RUSTFLAGS:-} -C force-unwind-tables=no"
         maturin build --profile wheel --locked --compression-level 9 --out dist "${other[@]}" "${zig[@]}"
     ) || missing=1
 done

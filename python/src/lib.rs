@@ -81,9 +81,21 @@ fn methods() -> Vec<(&'static str, &'static str, bool)> {
     catalogue::entries().map(|entry| (entry.name, entry.title, entry.adaptive)).collect()
 }
 
+/// Tells what it means that a panic ends the program, which it does in wheels that are distributed.
+#[cfg(panic = "abort")]
+fn explain_panics() {
+    let told = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        told(panic);
+        eprintln!("multibody: this is a defect of the package; report it with the lines above. The program ends.");
+    }));
+}
+
 /// The native part of the package.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    #[cfg(panic = "abort")]
+    explain_panics();
     module.add_class::<model::Model>()?;
     module.add_function(wrap_pyfunction!(model::load, module)?)?;
     module.add_function(wrap_pyfunction!(model::restore, module)?)?;
