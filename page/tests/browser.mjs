@@ -37,6 +37,8 @@ try {
     const { page, size } = await opened(model, more);
     const first = await page.evaluate("page.first");
     await page.until("page.measured.steps > 200 || !$('trouble').hidden");
+    // Until the page has found how fine its pictures can be.
+    if (!quick) await new Promise((resolve) => setTimeout(resolve, 5000));
     const { ms, t, frames, trouble } = JSON.parse(await page.evaluate(`(async () => {
       const from = [performance.now(), page.instant.t, page.measured.frames];
       await new Promise((resolve) => setTimeout(resolve, ${quick ? 800 : 3000}));

@@ -261,8 +261,8 @@ function ended(text) {
   trouble("The motion cannot go on", `${text}\nRestart it, change its start, or take shorter steps.`);
 }
 
-/** Draws coarser while a motion is shown by fewer than forty pictures a second, or two thirds of what the screen has, first without smooth
- *  edges; sharp again when it stands still. */
+/** Draws coarser while a motion is shown by fewer pictures than the screen has, or than sixty a second, first without smooth edges;
+ *  sharp again when it stands still. A picture now and then may be late. */
 function pace(passed) {
   page.period = Math.max(1 / 60, Math.min(page.period, passed || 1));
   if (!page.playing) {
@@ -270,8 +270,8 @@ function pace(passed) {
     [canvas.smooth, canvas.fineness, page.pace] = [true, 1, 0];
     return;
   }
-  page.pace += 0.1 * (passed - page.pace);
-  if (page.pace < 1.5 * page.period || canvas.fineness <= 0.4) return;
+  page.pace += 0.05 * (passed - page.pace);
+  if (page.pace < 1.15 * page.period || canvas.fineness <= 0.4) return;
   if (!canvas.smooth) canvas.fineness = Math.max(0.4, 0.75 * canvas.fineness);
   [canvas.smooth, page.pace] = [false, 0];
 }
