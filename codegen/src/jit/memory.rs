@@ -12,8 +12,8 @@
 //! - The memory of the code lives as long as the function and is never changed after it was made, so that any number of
 //!   threads may call it.
 //! - The functions for sines and cosines are called by this code alone, with parts of the working memory.
-//! - Code that is not Cranelift's is made only where the processor has its instructions. It changes no register that
-//!   belongs to its caller.
+//! - Code that is not Cranelift's is made only where the processor has its instructions. It gives the registers that belong
+//!   to its caller back as they were.
 //! - The tables of addresses may have places that are not written: the code reads only those of arrays with entries.
 #![allow(unsafe_code)]
 

@@ -239,6 +239,80 @@ fn compare_traits(whose: &str, plan: &Plan, s: &State) {
     check("multipliers", &r, &r2);
 }
 
+/// New parameters count from the next call on: in machine code of one state and of each lane, whose angles may be large, and in
+/// the interpreter, which is made anew when it has to compute something.
+#[test]
+fn parameters_change_between_calls() {
+    let outputs = [Output::Rates, Output::Momenta, Output::Accelerations];
+    let distribution = Distribution { bodies: (2, 6), params: 0.5, ..Distribution::default() };
+    let mut changed = 0;
+    for seed in 0..3 {
+        let model = random_model(seed, &distribution);
+        for options in [exact(EliminationStrategy::Fastest, RolledCode::Auto), Options::default()] {
+            let plan = search::plan(&model, options.plan);
+            let s = random_state(&plan, seed);
+            let params = |k: usize| s.params.iter().map(|x| x * (1.0 + 0.1 * k as f64)).collect::<Vec<f64>>();
+            let mut kept = compiled::<f64>(&plan, &options, &s);
+            let mut lanes = kept.lanes::<2>().expect("machine code");
+            for round in 0..3 {
+                let given: [Vec<f64>; 2] = [params(round), params(2 * round + 1)];
+                given.iter().enumerate().for_each(|(lane, row)| lanes.set_field(lane, 5, row));
+                for output in outputs {
+                    let spec = output.spec();
+                    let mut q = s.q.clone();
+                    if round == 1 && kept.lie_joints().is_empty() {
+                        q[0] = 1e9;
+                    }
+                    let arguments: Vec<&[f64]> = vec![&q, &s.v];
+                    let expected = given.each_ref().map(|row| {
+                        let mut fresh = compiled::<f64>(&plan, &options, &s);
+                        fresh.set_parameters(row);
+                        results_of(&mut fresh, output, &arguments)
+                    });
+                    kept.set_parameters(&given[1]);
+                    assert_eq!(results_of(&mut kept, output, &arguments), expected[1], "seed {seed}, {output:?}");
+                    if options.arithmetic == Arithmetic::Exact {
+                        let interpreted = interpreted_results_of(&mut kept, output, &arguments);
+                        assert_eq!(interpreted, expected[1], "seed {seed}, {output:?}, interpreted");
+                    }
+                    let packed = arguments.iter().map(|x| x.iter().map(|x| Packed([*x; 2])).collect::<Vec<_>>());
+                    let packed: Vec<_> = packed.collect();
+                    let packed: Vec<&[Packed<2>]> = packed.iter().map(|x| &x[..]).collect();
+                    let lengths = spec.results.iter().map(|r| r.len(kept.sizes()));
+                    let mut found: Vec<Vec<Packed<2>>> = lengths.map(|len| vec![Packed([0.0; 2]); len]).collect();
+                    let mut places: Vec<&mut [Packed<2>]> = found.iter_mut().map(Vec::as_mut_slice).collect();
+                    lanes.evaluate(output, &packed, &mut places).expect("machine code");
+                    for (lane, expected) in expected.iter().enumerate() {
+                        let found: Vec<f64> = found.concat().iter().map(|x| x.0[lane]).collect();
+                        assert_eq!(&found, expected, "seed {seed}, {output:?}, lane {lane}");
+                    }
+                    changed += usize::from(expected[0] != expected[1]);
+                }
+            }
+        }
+    }
+    assert!(changed > 25, "parameters changed {changed} results");
+}
+
+/// All results of an output, one after the other.
+fn results_of(machine: &mut Compiled, output: Output, arguments: &[&[f64]]) -> Vec<f64> {
+    let lengths = output.spec().results.iter().map(|r| r.len(machine.sizes()));
+    let mut found: Vec<Vec<f64>> = lengths.map(zeros).collect();
+    let mut places: Vec<&mut [f64]> = found.iter_mut().map(Vec::as_mut_slice).collect();
+    machine.evaluate(output, arguments, &mut places).expect("machine code");
+    found.concat()
+}
+
+/// The same by the interpreter, through a clone.
+fn interpreted_results_of(machine: &mut Compiled, output: Output, arguments: &[&[f64]]) -> Vec<f64> {
+    let mut machine = machine.clone().interpreted();
+    let lengths = output.spec().results.iter().map(|r| r.len(machine.sizes()));
+    let mut found: Vec<Vec<f64>> = lengths.map(zeros).collect();
+    let mut places: Vec<&mut [f64]> = found.iter_mut().map(Vec::as_mut_slice).collect();
+    machine.evaluate_or_interpret(output, arguments, &mut places).expect("the interpreter");
+    found.concat()
+}
+
 #[test]
 fn many_models() {
     (1000..1150).for_each(|seed| {

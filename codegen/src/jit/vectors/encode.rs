@@ -7,18 +7,22 @@
 use super::Lanes;
 
 mod control;
+mod windows;
 
 pub use control::{Jump, Label};
+pub use windows::{plan, Access};
 
 /// A vector register.
 pub type Register = u8;
 
-/// A register for addresses and counters. All of them belong to the called function.
+/// A register for addresses and counters. All but `Rbx` and `Rbp` belong to the called function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum General {
     Rax = 0,
     Rcx = 1,
     Rdx = 2,
+    Rbx = 3,
+    Rbp = 5,
     Rsi = 6,
     Rdi = 7,
     R8 = 8,
@@ -159,6 +163,10 @@ pub struct Assembler {
     exits: Vec<Jump>,
     /// Whether registers were written beyond their first 16 bytes.
     upper: bool,
+    /// What happens to accesses to the working memory.
+    windows: windows::Windows,
+    /// Whether registers of the caller are in use for that.
+    moving: bool,
 }
 
 /// An instruction with its operands.
@@ -177,7 +185,14 @@ struct Instruction {
 
 impl Assembler {
     pub fn new(wide: bool) -> Assembler {
-        Assembler { wide, bytes: Vec::new(), exits: Vec::new(), upper: false }
+        Assembler {
+            wide,
+            bytes: Vec::new(),
+            exits: Vec::new(),
+            upper: false,
+            windows: windows::Windows::Off,
+            moving: false,
+        }
     }
 
     /// `to = code(a, last)`; instructions of two operands have no `a`.
@@ -204,6 +219,7 @@ impl Assembler {
 
     /// Prefix, code and operands.
     fn write(&mut self, i: Instruction) {
+        let i = self.near(i);
         let (prefix, byte) = match i.code.single {
             Some(single) if i.lanes == Lanes::One => single,
             _ => (i.code.prefix, i.code.byte),
@@ -222,12 +238,17 @@ impl Assembler {
         }
     }
 
-    /// Whether an instruction needs the prefix of AVX-512, or is shorter with it.
-    fn evex(&self, i: &Instruction) -> bool {
+    /// Whether an instruction needs the prefix of AVX-512.
+    fn needs_evex(&self, i: &Instruction) -> bool {
         let needed = match i.last {
             Last::Register(r) => far(r),
             Last::Memory(m) => m.broadcast && !matches!(i.code.byte, 0x12 | 0x19),
         };
+        self.wide && (needed || i.mask.is_some() || i.lanes == Lanes::Eight || far(i.reg) || far(i.v))
+    }
+
+    /// Whether an instruction needs the prefix of AVX-512, or is shorter with it.
+    fn evex(&self, i: &Instruction) -> bool {
         let shorter = match i.last {
             // Distances of one byte count in units.
             Last::Memory(m) => {
@@ -236,8 +257,7 @@ impl Assembler {
             }
             Last::Register(_) => false,
         };
-        let needed = needed || i.mask.is_some() || i.lanes == Lanes::Eight || far(i.reg) || far(i.v);
-        self.wide && (needed || shorter)
+        self.needs_evex(i) || self.wide && shorter
     }
 
     fn evex_prefix(&mut self, i: &Instruction, prefix: u8) {
@@ -260,6 +280,11 @@ impl Assembler {
         self.bytes.extend([0x62, first, second, third]);
     }
 
+    /// Whether the prefix has two bytes in place of three where registers allow it.
+    fn has_short_vex(i: &Instruction) -> bool {
+        !i.code.w && matches!(i.code.map, Map::M0f)
+    }
+
     fn vex_prefix(&mut self, i: &Instruction, prefix: u8) {
         let (x, b) = match i.last {
             Last::Register(r) => (0, r >> 3 & 1),
@@ -267,7 +292,7 @@ impl Assembler {
         };
         let r = i.reg >> 3 & 1;
         let rest = (!i.v & 15) << 3 | u8::from(i.lanes == Lanes::Four) << 2 | prefix;
-        if x == 0 && b == 0 && !i.code.w && matches!(i.code.map, Map::M0f) {
+        if x == 0 && b == 0 && Assembler::has_short_vex(i) {
             self.bytes.extend([0xc5, (1 - r) << 7 | rest]);
         } else {
             let first = (1 - r) << 7 | (1 - x) << 6 | (1 - b) << 5 | i.code.map as u8;
@@ -278,7 +303,8 @@ impl Assembler {
     /// Operand byte and address; short distances are counted in `unit` bytes.
     fn address(&mut self, reg: u8, Address { base, index, offset, .. }: Address, unit: i32) {
         let (distance, short) = match (offset, offset % unit) {
-            (0, _) => (0, None),
+            // At `rbp`, what would be no distance is another kind of address.
+            (0, _) if base != General::Rbp => (0, None),
             (_, 0) => match i8::try_from(offset / unit) {
                 Ok(short) => (0x40, Some(short)),
                 Err(_) => (0x80, None),

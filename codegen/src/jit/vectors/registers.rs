@@ -9,7 +9,7 @@ mod places;
 use std::collections::BTreeMap;
 
 use super::body::{Binary, Body, Call, Entry, Id, Item, Step};
-use super::encode::{self as code, fused, Assembler, General, Jump, Label, Last, Order, Register};
+use super::encode::{self as code, fused, plan, Access, Assembler, General, Jump, Label, Last, Order, Register};
 use super::{Lanes, Width};
 use crate::lower::{Array, Memory};
 
@@ -110,6 +110,19 @@ struct FarCall {
 
 /// Writes a body. `None` if it is too long for the instructions' distances, or a loop reads a value from outside.
 pub fn write(body: &Body, width: Width, arrays: &Arrays) -> Option<Written> {
+    let (written, accesses) = written_with(body, width, arrays, Assembler::noting(width.wide))?;
+    // Registers that move would have to be where they were when a loop begins again.
+    let loops = body.items.iter().any(|item| matches!(item, Item::Open { .. }));
+    match if loops { None } else { plan(&accesses) } {
+        Some(plan) => {
+            written_with(body, width, arrays, Assembler::planned(width.wide, plan)).map(|(written, _)| written)
+        }
+        None => Some(written),
+    }
+}
+
+/// The same with an assembler; and the accesses to the working memory that it has noted.
+fn written_with(body: &Body, width: Width, arrays: &Arrays, assembler: Assembler) -> Option<(Written, Vec<Access>)> {
     let new = |lanes: &Lanes| Known { lanes: *lanes, register: None, slot: None, source: None, uses: Vec::new() };
     let mut known: Vec<Known> = body.lanes.iter().map(new).collect();
     for (k, item) in body.items.iter().enumerate().rev() {
@@ -126,7 +139,7 @@ pub fn write(body: &Body, width: Width, arrays: &Arrays) -> Option<Written> {
     let first_slot = aligned(own + body.carried);
     let loops = body.items.iter().any(|item| matches!(item, Item::Open { .. }));
     let mut writer = Writer {
-        assembler: Assembler::new(width.wide),
+        assembler,
         width,
         arrays,
         own,
@@ -150,12 +163,13 @@ pub fn write(body: &Body, width: Width, arrays: &Arrays) -> Option<Written> {
         writer.item(*item)?;
     }
     writer.assembler.return_0();
+    let accesses = writer.assembler.end_windows();
     writer.write_calls()?;
     let mut numbers = vec![0.0; writer.numbers];
     for ((bits, copies), at) in writer.constants {
         numbers[at..at + copies].fill(f64::from_bits(bits));
     }
-    Some(Written { bytes: writer.assembler.finish(), scratch: first_slot + writer.slots, numbers })
+    Some((Written { bytes: writer.assembler.finish(), scratch: first_slot + writer.slots, numbers }, accesses))
 }
 
 impl Writer<'_> {

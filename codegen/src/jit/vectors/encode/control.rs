@@ -88,7 +88,7 @@ impl Assembler {
     }
 
     /// Byte of instructions on the address `[base + offset]`, into a register of 64 bits.
-    fn of_address(&mut self, byte: u8, to: General, base: General, offset: i32) {
+    pub(super) fn of_address(&mut self, byte: u8, to: General, base: General, offset: i32) {
         self.bytes.extend([0x48 | (to as u8 >> 3) << 2 | base as u8 >> 3, byte]);
         self.address(to as u8, Address { base, index: None, offset, broadcast: false }, 1);
     }
@@ -142,7 +142,7 @@ impl Assembler {
     }
 
     /// An instruction of one byte that contains the number of a register.
-    fn extended(&mut self, register: General, byte: u8) {
+    pub(super) fn extended(&mut self, register: General, byte: u8) {
         if register as u8 >= 8 {
             self.bytes.push(0x41);
         }
@@ -162,6 +162,7 @@ impl Assembler {
             // vzeroupper
             self.bytes.extend([0xc5, 0xf8, 0x77]);
         }
+        self.restore();
         self.bytes.push(0xc3);
     }
 
