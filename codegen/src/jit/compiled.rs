@@ -490,7 +490,7 @@ impl<S: Number> Reducible for Compiled<S> {
     }
 
     fn with_implicit_springs(&self, step: S) -> Option<ImplicitSprings<Self, Vec<S>>> {
-        let (found, outdated) = (self.current().with_implicit_springs(step)?, false);
+        let found = self.current().with_implicit_springs(step)?;
         let Shared { plan, options, sizes, implicit, .. } = &*self.shared;
         let params = [&self.params[..], &[step]].concat();
         let sizes = Sizes { params: params.len(), ..*sizes };
@@ -500,7 +500,7 @@ impl<S: Number> Reducible for Compiled<S> {
             shared,
             planned: None,
             interpreter,
-            outdated,
+            outdated: false,
             params,
             calls,
             ..self.clone()
