@@ -224,6 +224,11 @@ async function loopsAndContacts() {
   const residual = await page.of("[page.instant.residual, Math.max(...page.history.map((i) => i.residual)), parts.residual.textContent]");
   claim(residual[1] < 1e-6 && /m or rad/.test(residual[2]), `loops stay closed: ${residual[1].toExponential(1)} at most; shown: ${residual[2]}`);
   await page.state("stewart");
+  await page.evaluate("$('look-reactions').click()");
+  await page.run((await page.evaluate("page.instant.t")) + 0.2);
+  const carried = await page.of("[page.instant.arrows().length, page.instant.arrows().every((a) => a.force.every(Number.isFinite)), Math.max(...page.instant.arrows().map((a) => Math.hypot(...a.force))), page.figure.weight()]");
+  claim(carried[0] > 0 && carried[1] && carried[2] > 0.05 * carried[3], `forces in ${carried[0]} joints, with those of loops: ${carried[2].toFixed(0)} N at most, weight ${carried[3].toFixed(0)} N`);
+  await page.state("stewart-reactions");
   await page.end("loops");
   page = await opened("models/contacts/quadruped.toml");
   await page.unfold();

@@ -85,9 +85,9 @@ impl Scene {
         arrows.map(|([a, b, c], [d, e, f])| [a, b, c, d, e, f]).collect()
     }
 
-    /// Forces that joints transmit to their outer bodies, in ground axes; none where loops or contacts have a share.
+    /// Forces that joints transmit to their outer bodies, in ground axes, with those of loops; none where contacts have a share.
     fn reactions(&mut self) -> Vec<[f64; 6]> {
-        if !self.view.rows().is_empty() || !self.plan.model.contacts.is_empty() {
+        if !self.plan.model.contacts.is_empty() {
             return Vec::new();
         }
         self.load.borrow_mut().set(&self.q, &self.v, &mut self.view.tau);
