@@ -14,8 +14,8 @@ const FLAT: f64 = 1e-12;
 /// Corners up to which faces are looked for, which takes a time that grows with the cube of their number.
 const MOST: usize = 500;
 
-/// The polyhedron of points that are its corners. `None` where they lie on a line or are more than 500, and where rounding does
-/// not tell which of them are on one face. Equal ones exist once, for as long as the program runs.
+/// The polyhedron of points that are its corners. `None` where they lie on a line or are more than 500, where rounding does not
+/// tell which of them are on one face, and where areas between them have no finite squares. Equal ones exist once, for as long as the program runs.
 pub(crate) fn polyhedron(corners: &[Vec3]) -> Option<&'static Polyhedron> {
     if corners.len() > MOST {
         return None;
@@ -81,6 +81,10 @@ fn sides(corners: &[Vec3]) -> Vec<Side> {
             for c in b + 1..n {
                 let across = cross(minus(&corners[b], &corners[a]), minus(&corners[c], &corners[a]));
                 let area = dot(across, across).sqrt();
+                // Products of numbers that are too large tell nothing.
+                if !area.is_finite() {
+                    return Vec::new();
+                }
                 if area <= EXACT * size * size {
                     continue;
                 }
@@ -141,6 +145,11 @@ mod tests {
         let plate = polyhedron(&cuboid[..4]).expect("two faces");
         assert_eq!([plate.faces.len(), plate.edges.len()], [2, 4]);
         assert_eq!(polyhedron(&cuboid[..2]), None);
+        // A fuzzer's: more corners than would be done in a day if each plane through three of them counted as a face.
+        for size in [1e100, 1e160, 1e300] {
+            let far: Vec<Vec3> = (0..400).map(|_| unit(draw.point()).map(|x| size * x)).collect();
+            assert_eq!(polyhedron(&far), None, "{size:e}");
+        }
         assert_eq!(polyhedron(&[]), None);
     }
 }

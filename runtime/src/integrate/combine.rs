@@ -2,7 +2,6 @@
 
 use super::chart::Point;
 use crate::constant::Constant;
-use crate::kernel::{call_lanes, Arithmetic, Kernel};
 use crate::system::System;
 use crate::Scalar;
 
@@ -28,43 +27,16 @@ const NARROW: bool = cfg!(target_feature = "avx");
 /// either.
 #[inline(always)]
 pub(super) fn combine<Y: System>(
-    out: [&mut [Y::Scalar]; 2],
+    mut out: [&mut [Y::Scalar]; 2],
     start: Option<Start<Y::Scalar>>,
     h: Y::Scalar,
     weights: &[(usize, Constant)],
     k: &[Point<Y>],
 ) {
+    #[cfg(feature = "std")]
     if Y::Scalar::LANES > 1 {
-        call_lanes::<OfLanes, 0, LANES, f64, Sums<Y>>((out, start, h, weights, k));
-    } else {
-        all((out, start, h, weights, k));
+        return in_vectors::combine::<Y>((out, start, h, weights, k));
     }
-}
-
-/// The arguments of [`combine`].
-type Sums<'a, Y> = (
-    [&'a mut [<Y as System>::Scalar]; 2],
-    Option<Start<'a, <Y as System>::Scalar>>,
-    <Y as System>::Scalar,
-    &'a [(usize, Constant)],
-    &'a [Point<Y>],
-);
-
-/// [`combine`] of numbers that stand for many: compiled for the instructions of the processor, as generated code is.
-struct OfLanes;
-
-/// Doubles of the longest vectors.
-const LANES: usize = 8;
-
-impl<Y: System> Kernel<0, LANES, Sums<'_, Y>> for OfLanes {
-    #[inline(always)]
-    fn run<A: Arithmetic>(sums: Sums<Y>) {
-        all(sums);
-    }
-}
-
-#[inline(always)]
-fn all<Y: System>((mut out, start, h, weights, k): Sums<Y>) {
     let mut at = 0;
     while !NARROW && some::<Y, 4>(&mut out, at, start, h, weights, k) {
         at += 4;
@@ -73,6 +45,45 @@ fn all<Y: System>((mut out, start, h, weights, k): Sums<Y>) {
         at += 2;
     }
     some::<Y, 1>(&mut out, at, start, h, weights, k);
+}
+
+/// Sums of numbers that stand for many: compiled for the instructions of the processor, as generated code is. Not in the code of
+/// small processors, which has no such numbers and would grow by a second copy.
+#[cfg(feature = "std")]
+mod in_vectors {
+    use super::{some, Constant, Point, Scalar, Start, System};
+    use crate::kernel::{call_lanes, Arithmetic, Kernel};
+
+    /// Doubles of the longest vectors.
+    const LANES: usize = 8;
+
+    /// The arguments of [`combine`](super::combine).
+    type Sums<'a, Y> = (
+        [&'a mut [<Y as System>::Scalar]; 2],
+        Option<Start<'a, <Y as System>::Scalar>>,
+        <Y as System>::Scalar,
+        &'a [(usize, Constant)],
+        &'a [Point<Y>],
+    );
+
+    struct InVectors;
+
+    impl<Y: System> Kernel<0, LANES, Sums<'_, Y>> for InVectors {
+        #[inline(always)]
+        fn run<A: Arithmetic>((mut out, start, h, weights, k): Sums<Y>) {
+            let mut at = 0;
+            while some::<Y, 4>(&mut out, at, start, h, weights, k) {
+                at += 4;
+            }
+            while some::<Y, 1>(&mut out, at, start, h, weights, k) {
+                at += 1;
+            }
+        }
+    }
+
+    pub fn combine<Y: System>(sums: Sums<Y>) {
+        call_lanes::<InVectors, 0, LANES, f64, Sums<Y>>(sums);
+    }
 }
 
 /// [`combine`] for `N` components of both parts from `at` on; returns whether there were as many.
