@@ -51,7 +51,7 @@ pub(super) fn combine<Y: System>(
 /// small processors, which has no such numbers and would grow by a second copy.
 #[cfg(feature = "std")]
 mod in_vectors {
-    use super::{some, Constant, Point, Scalar, Start, System};
+    use super::{some, Constant, Point, Start, System};
     use crate::kernel::{call_lanes, Arithmetic, Kernel};
 
     /// Doubles of the longest vectors.
