@@ -39,14 +39,14 @@ try {
     await page.until("page.measured.steps > 200 || !$('trouble').hidden");
     // Until the page has found how fine its pictures can be.
     if (!quick) await new Promise((resolve) => setTimeout(resolve, 5000));
-    const { ms, t, frames, trouble } = JSON.parse(await page.evaluate(`(async () => {
+    const { ms, t, frames, fineness, trouble } = JSON.parse(await page.evaluate(`(async () => {
       const from = [performance.now(), page.instant.t, page.measured.frames];
       await new Promise((resolve) => setTimeout(resolve, ${quick ? 800 : 3000}));
       const to = [performance.now(), page.instant.t, page.measured.frames], [ms, t, frames] = to.map((x, k) => x - from[k]);
-      return JSON.stringify({ ms, t, frames, trouble: $("trouble-text").textContent });
+      return JSON.stringify({ ms, t, frames, fineness: canvas.fineness, trouble: $("trouble-text").textContent });
     })()`));
     // Times are told only: other programs may run, and there may be no GPU. `speed.mjs` judges by the processor's time.
-    claim(!trouble, `${model}: ${(size / 1000).toFixed(0)} kB, first picture after ${first.toFixed(0)} ms, ${((1000 * t) / ms).toFixed(2)} times real time, ${((1000 * frames) / ms).toFixed(0)} pictures a second ${trouble}`);
+    claim(!trouble, `${model}: ${(size / 1000).toFixed(0)} kB, first picture after ${first.toFixed(0)} ms, ${((1000 * t) / ms).toFixed(2)} times real time, ${((1000 * frames) / ms).toFixed(0)} pictures a second at ${fineness.toFixed(2)} of the fineness ${trouble}`);
     quiet(page, model);
     await page.close();
   }

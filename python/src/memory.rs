@@ -10,8 +10,9 @@ use crate::arrays::ALIGNMENT;
 
 /// Length from which on memory comes from the system and goes back to it each time, doubles.
 pub const LARGE: usize = 1 << 14;
-/// What is kept of memory that no array uses: pieces, and doubles in all of them.
+/// How many pieces of memory are kept that no array uses.
 const PIECES: usize = 16;
+/// How many doubles all of these have at most.
 pub const KEPT: usize = 1 << 23;
 
 /// Memory that no array uses.

@@ -15,7 +15,8 @@ const FLAT: f64 = 1e-12;
 const MOST: usize = 500;
 
 /// The polyhedron of points that are its corners. `None` where they lie on a line or are more than 500, where rounding does not
-/// tell which of them are on one face, and where areas between them have no finite squares. Equal ones exist once, for as long as the program runs.
+/// tell which of them are on one face, and where areas between them have no finite squares. Equal ones exist once, for as long
+/// as the program runs.
 pub(crate) fn polyhedron(corners: &[Vec3]) -> Option<&'static Polyhedron> {
     if corners.len() > MOST {
         return None;

@@ -112,13 +112,16 @@ struct FarCall {
 pub fn write(body: &Body, width: Width, arrays: &Arrays) -> Option<Written> {
     let (written, accesses) = written_with(body, width, arrays, Assembler::noting(width.wide))?;
     // Registers that move would have to be where they were when a loop begins again.
-    let loops = body.items.iter().any(|item| matches!(item, Item::Open { .. }));
-    match if loops { None } else { plan(&accesses) } {
+    match if has_loops(body) { None } else { plan(&accesses) } {
         Some(plan) => {
             written_with(body, width, arrays, Assembler::planned(width.wide, plan)).map(|(written, _)| written)
         }
         None => Some(written),
     }
+}
+
+fn has_loops(body: &Body) -> bool {
+    body.items.iter().any(|item| matches!(item, Item::Open { .. }))
 }
 
 /// The same with an assembler; and the accesses to the working memory that it has noted.
@@ -137,7 +140,6 @@ fn written_with(body: &Body, width: Width, arrays: &Arrays, assembler: Assembler
     let aligned = |at: usize| if width.states == Lanes::One { at.next_multiple_of(Lanes::Eight.count()) } else { at };
     let own = aligned(arrays.memory.len());
     let first_slot = aligned(own + body.carried);
-    let loops = body.items.iter().any(|item| matches!(item, Item::Open { .. }));
     let mut writer = Writer {
         assembler,
         width,
@@ -153,7 +155,7 @@ fn written_with(body: &Body, width: Width, arrays: &Arrays, assembler: Assembler
         numbers: 0,
         calls: Vec::new(),
         pointers: Default::default(),
-        most_pointers: POINTERS.len() - usize::from(loops),
+        most_pointers: POINTERS.len() - usize::from(has_loops(body)),
         distances: Default::default(),
         loops: Vec::new(),
         now: 0,
