@@ -15,7 +15,7 @@ pub use windows::{plan, Access};
 /// A vector register.
 pub type Register = u8;
 
-/// A register for addresses and counters. All but `Rbx` and `Rbp` belong to the called function.
+/// A register for addresses and counters. All but `Rbx`, `Rbp`, `R14` and `R15` belong to the called function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum General {
     Rax = 0,
@@ -29,6 +29,8 @@ pub enum General {
     R9 = 9,
     R10 = 10,
     R11 = 11,
+    R14 = 14,
+    R15 = 15,
 }
 
 /// Memory at a register, another register that is added, and a distance, bytes.
@@ -163,10 +165,12 @@ pub struct Assembler {
     exits: Vec<Jump>,
     /// Whether registers were written beyond their first 16 bytes.
     upper: bool,
-    /// What happens to accesses to the working memory.
+    /// What happens to accesses to the working memory and the function's numbers.
     windows: windows::Windows,
-    /// Whether registers of the caller are in use for that.
-    moving: bool,
+    /// How many registers of the caller are in use for that.
+    moving: usize,
+    /// The register with the address of the function's numbers.
+    pub numbers: Option<General>,
 }
 
 /// An instruction with its operands.
@@ -191,7 +195,8 @@ impl Assembler {
             exits: Vec::new(),
             upper: false,
             windows: windows::Windows::Off,
-            moving: false,
+            moving: 0,
+            numbers: None,
         }
     }
 

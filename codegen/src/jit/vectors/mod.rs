@@ -145,3 +145,6 @@ pub fn compile(
     numbers.append(&mut written.numbers);
     Some(Written { numbers, ..written })
 }
+
+#[cfg(test)]
+mod tests;

@@ -37,3 +37,31 @@ fn numbers_are_read_where_they_are_used_if_they_are_still_there() {
     let found = [stays, written, before, other, early, carried[0], carried[1], outside].map(|x| in_place(&body, x));
     assert_eq!(found, [true, false, true, false, true, false, true, true]);
 }
+
+/// Sines of vectors of two are computed by as many at once as the longest vector has room for: of six vectors, in vectors of eight
+/// and of four numbers, or in three of four.
+#[test]
+fn sines_of_short_vectors_are_computed_together() {
+    for (wide, expected) in [(true, vec![8, 4]), (false, vec![4, 4, 4])] {
+        let mut body = Body::new(true, Width { states: Lanes::One, wide }, 2);
+        body.vectors(true);
+        let angles: Vec<Signed> = (0..6).map(|at| body.load(Place::fixed(Array::Kept, 2 * at))).collect();
+        let pairs = body.sines(&angles);
+        let lengths = body.items.iter().filter_map(|item| match item {
+            Item::CallIfSigns(beyond, _) => Some(body.lanes[*beyond as usize].count()),
+            _ => None,
+        });
+        assert_eq!(lengths.collect::<Vec<_>>(), expected);
+        let place = |of: &Signed| {
+            body.items.iter().find_map(|item| match item {
+                Item::Value(id, Step::Again(entry)) if *id == of.id => Some(entry.at),
+                _ => None,
+            })
+        };
+        // Each sine has a place of its own, two entries after the one before it in the same vector.
+        let sines: Vec<usize> = pairs.iter().map(|[sin, _]| place(sin).expect("is read from memory")).collect();
+        let in_one = expected[0] / 2;
+        assert!((1..in_one).all(|k| sines[k] == sines[0] + 2 * k), "{sines:?}");
+        assert!(pairs.iter().flatten().all(|x| body.lanes[x.id as usize] == Lanes::Two));
+    }
+}

@@ -14,18 +14,24 @@ impl Body {
 
     /// A vector of single numbers; one stands for all.
     pub(super) fn packed(&mut self, numbers: &[Id], lanes: Lanes) -> Id {
-        if lanes == Lanes::One {
-            return numbers[0];
-        }
-        if numbers.iter().all(|x| *x == numbers[0]) {
+        if lanes > Lanes::One && numbers.iter().all(|x| *x == numbers[0]) {
             return match self.constant_of(numbers[0]) {
                 Some(bits) => self.value_of(lanes, Step::Constant(bits)),
                 None => self.value_of(lanes, Step::Broadcast(numbers[0])),
             };
         }
+        self.joined(numbers, lanes)
+    }
+
+    /// The numbers of several vectors of equal lengths in one.
+    fn joined(&mut self, parts: &[Id], lanes: Lanes) -> Id {
+        if parts.len() == 1 {
+            return parts[0];
+        }
         let half = Lanes::for_numbers(lanes.count() / 2, Lanes::Four);
-        let (a, b) = numbers.split_at(half.count());
-        let (a, b) = (self.packed(a, half), self.packed(b, half));
+        let (a, b) = parts.split_at(parts.len() / 2);
+        let single = self.lanes(parts[0]) == Lanes::One;
+        let [a, b] = [a, b].map(|parts| if single { self.packed(parts, half) } else { self.joined(parts, half) });
         self.value_of(lanes, Step::Binary(Binary::Join, a, b))
     }
 
@@ -48,23 +54,19 @@ impl Body {
         self.value_of(Lanes::One, Step::Again(Body::carried(at + k)))
     }
 
-    /// Sines and cosines of angles of one state: of single numbers together, of vectors one by one.
+    /// Sines and cosines of angles of one state, single numbers or vectors: as many together as the longest vector has room for.
     pub(super) fn sines_of_one(&mut self, angles: &[Signed]) -> Vec<[Signed; 2]> {
-        if self.now != Lanes::One {
-            let pairs = angles.iter().map(|angle| self.vector_sines(angle.id).map(|at| (self.now, at)));
-            let pairs: Vec<_> = pairs.collect();
-            return pairs.into_iter().map(|pair| pair.map(|(lanes, at)| self.again(lanes, at))).collect();
-        }
-        let mut pairs = Vec::new();
+        let each = self.now;
         let most = if self.width.wide { Lanes::Eight } else { Lanes::Four };
-        for angles in angles.chunks(most.count()) {
-            let lanes = Lanes::for_numbers(angles.len(), most);
+        let mut pairs = Vec::new();
+        for angles in angles.chunks(most.count() / each.count()) {
+            let lanes = Lanes::for_numbers(angles.len() * each.count(), most);
             let mut ids: Vec<Id> = angles.iter().map(|angle| angle.id).collect();
             // The last ones fill the vector.
-            (ids.len()..lanes.count()).for_each(|k| ids.push(ids[if k > 1 { k - 2 } else { 0 }]));
-            let vector = self.packed(&ids, lanes);
+            (ids.len()..lanes.count() / each.count()).for_each(|k| ids.push(ids[if k > 1 { k - 2 } else { 0 }]));
+            let vector = if each == Lanes::One { self.packed(&ids, lanes) } else { self.joined(&ids, lanes) };
             let at = self.vector_sines(vector);
-            pairs.extend((0..angles.len()).map(|k| at.map(|at| self.again(Lanes::One, at + k))));
+            pairs.extend((0..angles.len()).map(|k| at.map(|at| self.again(each, at + k * each.count()))));
         }
         pairs
     }

@@ -223,6 +223,8 @@ impl Writer<'_> {
             }
         };
         self.pointers[at] = (Some(of), self.now + 1);
+        let numbers = self.pointers.iter().position(|(of, _)| *of == Some(Pointer::Numbers));
+        self.assembler.numbers = numbers.map(|at| POINTERS[at]);
         Some(POINTERS[at])
     }
 }
