@@ -14,6 +14,7 @@ use multibody::codegen::search;
 use multibody::runtime::constrained::{close, complete, Closing};
 use multibody::runtime::contact::{ModeTable, WithContacts};
 use multibody::runtime::sweep::FrameState;
+use multibody::runtime::tree::WrenchAxes;
 use multibody::runtime::{Conjugate, Constrained, Interpreter, System as _};
 
 use crate::evaluator::Evaluator;
@@ -77,10 +78,17 @@ fn system(plan: &Plan, load: &Rc<RefCell<Load>>) -> System {
     WithContacts::new(ModeTable::new(evaluator, contacts))
 }
 
-/// An interpreter of the mechanism without contacts.
+/// An interpreter of the mechanism without contacts. If there are some, a wrench in ground axes on the body behind each joint comes
+/// after the wrenches of the model.
 fn viewer(plan: &Plan) -> Interpreter<f64> {
+    let mut plan = plan.clone();
+    if !plan.model.contacts.is_empty() {
+        // The frames of these bodies come first.
+        plan.wrenches.extend((0..plan.joint_nodes.len()).map(|frame| (frame, WrenchAxes::Ground)));
+        plan.dims.wrenches = plan.wrenches.len();
+    }
     let mut interpreter = plan.default_interpreter();
-    gravity(plan, &mut interpreter);
+    gravity(&plan, &mut interpreter);
     interpreter
 }
 

@@ -238,6 +238,11 @@ async function loopsAndContacts() {
   const arrows = await page.state("forces");
   await page.key("v");
   claim((await page.state("no-forces")) !== arrows, "V hides the forces");
+  // It stands still; joints 1, 4, 7 and 10 carry the legs, and push the trunk up by what they pull the legs down.
+  await page.evaluate("$('look-reactions').click()");
+  const hips = await page.of("page.instant.arrows().filter((a) => !a.contact).filter((a, k) => k % 3 === 1).reduce((sum, a) => sum - a.force[2], 0)");
+  claim(Math.abs(hips - 1.2 * 9.81) < 1e-6, `forces in joints with those of contacts: the legs carry ${hips.toFixed(6)} N of a trunk of 1.2 kg`);
+  await page.state("contact-reactions");
   await page.end("contacts");
   page = await opened("models/ur5.urdf");
   await page.unfold();

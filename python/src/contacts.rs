@@ -5,11 +5,12 @@ use multibody::codegen::options::Arithmetic;
 use multibody::codegen::output::FIELDS;
 use multibody::codegen::plan::Plan;
 use multibody::codegen::Options;
+use multibody::runtime::catalogue::{self, BoxedMethod};
 use multibody::runtime::constrained::{Effort, Projection, Stabilisation, WithPostStep};
 use multibody::runtime::contact::{
     Contact, ContactMotion, HybridError, ModeTable, Regime, RegimeChoice, RegimeRules, WithContacts,
 };
-use multibody::runtime::integrate::{AutoSwitch, Dop853, Radau5, Rk4, Step, StepError, Stepper, Tolerances};
+use multibody::runtime::integrate::{AutoSwitch, Radau5, Step, StepError, Tolerances};
 
 use crate::errors::Failed;
 use crate::rollout::{Item, Motion};
@@ -18,15 +19,12 @@ use crate::settings::Settings;
 use crate::told::Kept;
 
 type System = WithContacts<ModeTable<Compiled>>;
-type Method = WithPostStep<System, Box<dyn Stepper<System>>, Projection<System>>;
+type Method = WithPostStep<System, BoxedMethod<'static, System>, Projection<System>>;
 
 /// Longest time step where events crowd, s.
 const LONGEST: f64 = 1e-3;
 /// Steps of the method between two rows of the result.
 const MOST_STEPS: u64 = 1_000_000;
-
-/// The methods that follow contacts: their names.
-pub const METHODS: [&str; 2] = ["rk4", "dop853"];
 
 /// A mechanism with contacts. Its arithmetic is exact, so that machine code and the interpreter give the same bits, however
 /// often modes were visited before.
@@ -67,22 +65,23 @@ impl Touching {
 }
 
 /// The method of the settings, with what closes loops and contacts.
-fn method(settings: &Settings, system: &System) -> (Method, Projection<System>, Step) {
-    let method: Box<dyn Stepper<System>> = match &settings.method[..] {
-        "dop853" => Box::new(Dop853::new(system)),
-        _ => Box::new(Rk4::new(system)),
-    };
+fn method(settings: &Settings, system: &System) -> Result<(Method, Projection<System>, Step), StepError> {
+    let method = catalogue::any(&settings.method, system, false).ok_or(StepError::NoEstimate { time: 0.0 })?;
+    let explicit = catalogue::EXPLICIT.iter().any(|entry| entry.name == settings.method);
     let effort = Effort { energy: f64::INFINITY, ..Effort::default() };
     let hold = || Projection::new(system, Stabilisation::default(), effort);
     let (method, step) = match settings.tolerance {
         None => (method, Step::Fixed(settings.dt)),
         Some(tolerance) => {
-            // What slides slowly is stiff.
-            let method = Box::new(AutoSwitch::new(system, method, Radau5::new(system)));
-            (method as Box<dyn Stepper<System>>, Step::Adaptive(Tolerances::new(tolerance)))
+            let method = match explicit {
+                // What slides slowly is stiff.
+                true => Box::new(AutoSwitch::new(system, method, Radau5::new(system))),
+                false => method,
+            };
+            (method, Step::Adaptive(Tolerances::new(tolerance)))
         }
     };
-    (WithPostStep::new(system, method, hold()), hold(), step)
+    Ok((WithPostStep::new(system, method, hold()), hold(), step))
 }
 
 /// Index of the parameters among the fields.
@@ -155,7 +154,7 @@ impl Motion<'_> {
         beat: &mut Beat,
     ) -> Result<(), Failed> {
         let mut state = self.begin(machine, *k)?;
-        let (method, close, step) = method(self.settings, system);
+        let (method, close, step) = method(self.settings, system).map_err(|error| failed(&error.into()))?;
         let length = if self.regime == RegimeChoice::TimeSteps { f64::INFINITY } else { LONGEST };
         let rules = RegimeRules::new(self.regime, self.settings.dt.min(length));
         if self.settings.steps > 0 {

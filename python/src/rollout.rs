@@ -9,12 +9,11 @@ use multibody::runtime::integrate::StepError;
 use multibody::runtime::layout::Layout;
 use multibody::runtime::{Conjugate, Constrained, System};
 use numpy::PyArrayDyn;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays::{result, writable, Given, Rows};
-use crate::contacts::{self, Touching};
+use crate::contacts::Touching;
 use crate::driver::{rates_tell_velocities, Driver};
 use crate::drives::{self, Moving};
 use crate::errors::{compile_error, Failed};
@@ -58,12 +57,6 @@ pub fn rollout<'py>(
     settings.check()?;
     let touches = !model.description.contacts.is_empty();
     asked.check(touches)?;
-    if touches && !contacts::METHODS.contains(&&settings.method[..]) {
-        let (method, names) = (&settings.method, contacts::METHODS.join(" or "));
-        return Err(PyValueError::new_err(format!(
-            "`{method}` does not follow the contacts of the model: take {names}"
-        )));
-    }
     let (layout, machines) = (settings.layout(model)?, model.machines(py)?);
     for output in [Output::Rates, Output::Velocities, Output::Momenta] {
         machines.prepare(py, output).map_err(|e| compile_error(py, &e))?;

@@ -185,8 +185,6 @@ def test_loops_stay_closed(linkage):
 def test_contacts_are_followed():
     ball = multibody.load(MODELS / "contacts" / "bouncing_ball.toml")
     assert ball.contact_names
-    with pytest.raises(ValueError, match="`rk4-doubling` does not follow the contacts"):
-        ball.rollout(ball.start(), dt=1e-3, steps=5, method="rk4-doubling")
     q, v = ball.start()
     q, v = np.stack([q, q, q]), np.stack([v, v, v])
     v[1, 0] = 0.3
@@ -210,6 +208,24 @@ def test_contacts_are_followed():
     for contacts, failing in (("events", [0, 1]), ("automatic", [1]), ("steps", [1])):
         inside = ball.rollout((q, 0 * v), dt=5e-3, steps=2, on_error="mark", contacts=contacts)
         assert [(failure.row, failure.kind) for failure in inside.failures] == [(row, "overlap") for row in failing]
+
+
+@pytest.mark.parametrize(("method", "adaptive"), [(name, adaptive) for name, _, adaptive in multibody.methods()])
+def test_contacts_are_followed_by_every_method(method, adaptive):
+    """A double pendulum strikes a wall: half the step takes the errors of the first order, or of the second and higher ones, away."""
+    pendulum = multibody.load(MODELS / "contacts" / "pendulum_on_wall.toml", search=False)
+    start, dt, steps = pendulum.start(), 2e-3, 600
+    reference = pendulum.rollout(start, dt=dt, steps=steps, tolerance=1e-12, method="dop853", events=True)
+    errors = []
+    for parts in (1, 2):
+        motion = pendulum.rollout(start, dt=dt / parts, steps=parts * steps, every=parts, method=method, events=True)
+        assert len(motion.events) == len(reference.events) == 1
+        errors.append(abs(motion.q - reference.q).max())
+    first = method in ("euler", "semi-implicit-euler", "backward-euler")
+    assert errors[1] < max(errors[0] / (1.9 if first else 3.8), 1e-11) and errors[0] < (0.1 if first else 2e-4), errors
+    if adaptive:
+        motion = pendulum.rollout(start, dt=dt, steps=steps, tolerance=1e-9, method=method)
+        assert abs(motion.q - reference.q).max() < 1e-8
 
 
 def test_legs_creep_with_the_square_of_the_step():

@@ -279,24 +279,23 @@ impl Touch {
         self.terrains.iter().flat_map(|terrain| lines(terrain.field, &poses[terrain.frame], seen)).collect()
     }
 
-    /// Forces on the second bodies, or on the first ones where the second is the ground, from their components along the
-    /// rows of each contact.
+    /// Forces on the second bodies from their components along the rows of each contact.
     pub fn arrows(&self, poses: &[FrameState<f64>], forces: &[[f64; 3]]) -> Vec<Arrow> {
-        let mut arrows: Vec<Arrow> = Vec::new();
-        for (place, force) in self.places.iter().zip(forces) {
-            let Some(place) = place else { continue };
-            if force.iter().all(|f| *f == 0.0) {
-                continue;
-            }
-            let [a, b] = [0, 1].map(|k| {
-                let at = &poses[place.frames[k]];
-                (product(&at.rotation, &towards(place.axes[k])), at.position)
-            });
-            let Some((point, rows)) = place.closure.touching((&a.0, a.1), (&b.0, b.1)) else { continue };
-            let whole = rows.iter().zip(force).fold([0.0; 3], |sum, (row, f)| plus(sum, times(*f, *row)));
-            arrows.push((point, whole));
+        forces.iter().enumerate().filter_map(|(k, force)| self.arrow(poses, k, force)).collect()
+    }
+
+    /// The force on the second body of contact `k`; `None` where it is zero, and for stops of joints.
+    pub fn arrow(&self, poses: &[FrameState<f64>], k: usize, force: &[f64; 3]) -> Option<Arrow> {
+        let place = self.places.get(k)?.as_ref()?;
+        if force.iter().all(|f| *f == 0.0) {
+            return None;
         }
-        arrows
+        let [a, b] = [0, 1].map(|k| {
+            let at = &poses[place.frames[k]];
+            (product(&at.rotation, &towards(place.axes[k])), at.position)
+        });
+        let (point, rows) = place.closure.touching((&a.0, a.1), (&b.0, b.1))?;
+        Some((point, rows.iter().zip(force).fold([0.0; 3], |sum, (row, f)| plus(sum, times(*f, *row)))))
     }
 }
 

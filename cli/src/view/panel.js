@@ -230,8 +230,7 @@ function lookPart(scene) {
     // What is shown was computed without them.
     if (page.scene && !page.playing && page.shown === page.history.length - 1) change({ action: "frame", steps: 0, most: 1 });
   }, { id: `look-${key}` });
-  const hasReactions = !scene.contacts.length;
-  const list = [...(scene.contacts.length ? [forces("forces of contacts", "forces")] : []), ...(hasReactions ? [forces("forces in joints", "reactions")] : []), check("names", look.names, set("names"), { id: "look-names" }), check("follow the mechanism", look.follow, set("follow"), { id: "look-follow" }), check("shadows", look.shadows, set("shadows")), choice("path of", [[-1, "nothing"], ...frames], look.traceOf, (k) => ((look.traceOf = +k), (page.changed = true)))];
+  const list = [...(scene.contacts.length ? [forces("forces of contacts", "forces")] : []), forces("forces in joints", "reactions"), check("names", look.names, set("names"), { id: "look-names" }), check("follow the mechanism", look.follow, set("follow"), { id: "look-follow" }), check("shadows", look.shadows, set("shadows")), choice("path of", [[-1, "nothing"], ...frames], look.traceOf, (k) => ((look.traceOf = +k), (page.changed = true)))];
   if (/\.(urdf|xml)$/i.test(page.opened.name)) list.push(check("shapes to look at", look.visuals !== false, (on) => ((look.visuals = on), visualise(), (page.changed = true))));
   list.push(choice("theme", [["", "as the system"], ["light", "light"], ["dark", "dark"]], document.documentElement.dataset.theme ?? "", (theme) => {
     if (theme) document.documentElement.dataset.theme = theme;

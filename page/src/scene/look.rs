@@ -1,9 +1,11 @@
 //! What the page shows of an instant, and what it keeps of a step: crossings of a section.
 
+use multibody::codegen::model::ConstraintKind;
+use multibody::runtime::spatial::cross;
 use multibody::runtime::sweep::FrameState;
 use multibody::runtime::Constrained;
 
-use super::Scene;
+use super::{value, Scene};
 use crate::motion::{energies, Motion};
 
 /// Largest number of crossings of a section between two looks.
@@ -52,8 +54,11 @@ impl Scene {
         let work = self.motion.as_ref().map_or(0.0, |motion| motion.work);
         let error = kinetic + potential + spring - self.budget - work;
         let residual = self.residual();
-        let arrows = if forces { self.arrows() } else { Vec::new() };
-        let reactions = if forces { self.reactions() } else { Vec::new() };
+        let touching = if forces { self.contact_forces() } else { Vec::new() };
+        let poses = self.touch.as_mut().map_or(Vec::new(), |touch| touch.poses(&self.q, &self.v));
+        let arrows = self.touch.as_ref().map_or(Vec::new(), |touch| touch.arrows(&poses, &touching));
+        let arrows: Vec<[f64; 6]> = arrows.iter().map(|([a, b, c], [d, e, f])| [*a, *b, *c, *d, *e, *f]).collect();
+        let reactions = if forces { self.reactions(&poses, &touching) } else { Vec::new() };
         let modes = self.motion.as_ref().map_or(Vec::new(), |motion| motion.modes(&self.system));
         let steps = self.motion.as_ref().is_ok_and(Motion::by_time_steps);
         let held = self.load.borrow_mut().pull.as_mut().map(|pull| {
@@ -75,22 +80,16 @@ impl Scene {
         out.extend(self.crossings.drain(..).flatten());
     }
 
-    /// Forces of contacts: where they act and their components, in ground axes.
-    fn arrows(&mut self) -> Vec<[f64; 6]> {
-        let (Some(touch), Ok(_)) = (&mut self.touch, &self.motion) else { return Vec::new() };
+    /// Forces of contacts: their components along the rows of each; none where there is no motion.
+    fn contact_forces(&self) -> Vec<[f64; 3]> {
         // In a copy: nothing of the motion depends on whether it is looked at.
-        let forces = self.system.clone().forces(self.t, &self.q, &self.p).to_vec();
-        let poses = touch.poses(&self.q, &self.v);
-        let arrows = touch.arrows(&poses, &forces).into_iter();
-        arrows.map(|([a, b, c], [d, e, f])| [a, b, c, d, e, f]).collect()
+        self.motion.as_ref().map_or(Vec::new(), |_| self.system.clone().forces(self.t, &self.q, &self.p).to_vec())
     }
 
-    /// Forces that joints transmit to their outer bodies, in ground axes, with those of loops; none where contacts have a share.
-    fn reactions(&mut self) -> Vec<[f64; 6]> {
-        if !self.plan.model.contacts.is_empty() {
-            return Vec::new();
-        }
+    /// Forces that joints transmit to their outer bodies, in ground axes, with those of loops and contacts.
+    fn reactions(&mut self, poses: &[FrameState<f64>], touching: &[[f64; 3]]) -> Vec<[f64; 6]> {
         self.load.borrow_mut().set(&self.q, &self.v, &mut self.view.tau);
+        self.touched(poses, touching);
         let count = self.plan.joint_nodes.len();
         let (mut a, mut wrenches) = (self.v.clone(), vec![[0.0; 6]; count]);
         self.view.reactions(&self.q, &self.v, &mut a, &mut wrenches);
@@ -99,5 +98,31 @@ impl Scene {
             [frame.position[0], frame.position[1], frame.position[2], force[0], force[1], force[2]]
         };
         self.frames.iter().zip(&wrenches).map(at).collect()
+    }
+
+    /// Gives what is shown the forces of contacts: those of bodies as wrenches, those of stops as joint forces.
+    fn touched(&mut self, poses: &[FrameState<f64>], touching: &[[f64; 3]]) {
+        let (plan, view) = (&self.plan, &mut self.view);
+        let Some((_, wrenches)) = view.wrenches.split_at_mut_checked(plan.wrenches.len()) else { return };
+        wrenches.fill([0.0; 6]);
+        for (k, (contact, force)) in plan.model.contacts.iter().zip(touching).enumerate() {
+            if let ConstraintKind::Coupling { terms, .. } = &contact.kind {
+                for (joint, ratio) in terms {
+                    if let Some(axis) = plan.axes().find(|axis| axis.joint == *joint) {
+                        view.tau[axis.v] += value(&plan.model, *ratio) * force[0];
+                    }
+                }
+            }
+            let arrow = self.touch.as_ref().and_then(|touch| touch.arrow(poses, k, force));
+            let (Some((point, force)), Some(Some(ends))) = (arrow, plan.contact_frames.get(k)) else { continue };
+            for (end, sign) in ends.iter().zip([-1.0, 1.0]) {
+                let joint = plan.joint_nodes.iter().position(|node| Some(*node) == end.node);
+                let Some(joint) = joint else { continue };
+                let from = self.frames[joint].position;
+                let (arm, force) = (std::array::from_fn(|i| point[i] - from[i]), force.map(|f| sign * f));
+                let wrench = force.into_iter().chain(cross(arm, force));
+                wrenches[joint].iter_mut().zip(wrench).for_each(|(sum, x)| *sum += x);
+            }
+        }
     }
 }
