@@ -30,7 +30,7 @@ except ImportError as missing:
 
 MODELS = pathlib.Path(__file__).resolve().parents[2] / "models" / "contacts"
 TOLERANCES = ["1e-3", "1e-4", "1e-5", "1e-6", "1e-7", "1e-8", "1e-9", "1e-10", "1e-11", "1e-12", "1e-13"]
-STEPS = [4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5]
+STEPS = [2e-2, 1e-2, 4e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5]
 ROUNDS = 3
 # A run of a rival that takes longer than this is its last one with these settings, s.
 PATIENCE = 3.0
@@ -160,9 +160,9 @@ def without_contacts(text):
     return "\n".join(kept)
 
 
-def our_runs(ours, path, end, rounds, tolerances):
-    """Mass and energies at the start, and the runs."""
-    command = [ours, str(path), repr(end), str(rounds), *tolerances]
+def our_runs(ours, path, end, rounds, ways):
+    """Mass and energies at the start, and the runs by tolerances or time steps."""
+    command = [ours, str(path), repr(end), str(rounds), *ways]
     lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
     start, *runs = [json.loads(line) for line in lines]
     return start, runs
@@ -205,15 +205,20 @@ def compare(name, ours, work):
     path = work / f"{name}.toml"
     path.write_text(text)
     # All tolerances twice: in the first pass, machine code is made for the modes in which the motion stays.
-    _, runs = our_runs(ours, path, end, ROUNDS, TOLERANCES * 2)
+    steps = [f"steps:{step!r}" for step in STEPS]
+    _, runs = our_runs(ours, path, end, ROUNDS, TOLERANCES * 2 + steps)
     runs = runs[len(TOLERANCES) :]
-    wanted = known or runs[-1]["places"]
-    mine = [
-        {"setting": f"tolerance {r['tolerance']:g}", "seconds": r["seconds"], "error": error(r["places"], wanted), "events": len(r["events"])}
-        for r in (runs if known else runs[:-1])
-    ]
+    by_events, by_steps = runs[: len(TOLERANCES)], runs[len(TOLERANCES) :]
+    wanted = known or by_events[-1]["places"]
+
+    def mine_of(run):
+        kind, _, length = run["way"].rpartition(":")
+        how = {"setting": "time steps", "step": float(length)} if kind else {"setting": "by events", "tolerance": float(length)}
+        return how | {"seconds": run["seconds"], "error": error(run["places"], wanted)}
+
+    mine = [mine_of(run) for run in (by_events if known else by_events[:-1]) + by_steps]
     scene = mjcf.Scene(path)
-    check(name, text, ours, work, scene, runs[-1]["events"][0])
+    check(name, text, ours, work, scene, by_events[-1]["events"][0])
 
     def measured(answer):
         return answer and (answer[0], error(answer[1], wanted))

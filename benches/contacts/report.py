@@ -24,7 +24,7 @@ def metres(x):
 
 
 def knob(run):
-    return next(f"{name} {run[name]:g}{unit}" for name, unit in (("step", " s"), ("accuracy", "")) if name in run)
+    return next(f"{name} {run[name]:g}{unit}" for name, unit in (("step", " s"), ("accuracy", ""), ("tolerance", "")) if name in run)
 
 
 def fastest(runs, least):
@@ -61,7 +61,7 @@ def summary(result):
             cells += [times(faster(best, scene["ours"])), times(min(useful)) if useful else "no such run"]
             long.append([
                 scene["title"], rival, metres(best["error"]), f'{best["setting"]}, {knob(best)}', seconds(best["seconds"]),
-                *([mine["setting"], metres(mine["error"]), seconds(mine["seconds"])] if mine else ["none", "", ""]),
+                *([f'{mine["setting"]}, {knob(mine)}', metres(mine["error"]), seconds(mine["seconds"])] if mine else ["none", "", ""]),
             ])
         short.append([scene["title"], *cells, metres(own["error"]), seconds(own["seconds"])])
     columns = [c.format(rival) for rival in result["versions"] for c in ("faster than {}", "least advantage over {}")]
@@ -75,10 +75,10 @@ def tables(result):
     for scene in result["scenes"]:
         reference = "the analytic answer" if scene["known"] else "our run at a tolerance of 1e-13"
         text += f"\n### {scene['title'].capitalize()}\n{scene['end']:g} s; errors against {reference}.\n\n"
-        rows = [["multibody", r["setting"], "", seconds(r["seconds"]), metres(r["error"])] for r in scene["ours"]]
-        for rival, runs in scene["rivals"].items():
+        rows = []
+        for rival, runs in ({"multibody": scene["ours"]} | scene["rivals"]).items():
             rows += [[rival, r["setting"], knob(r), seconds(r["seconds"]), metres(r["error"])] for r in runs]
-        text += table(["program", "settings", "step or accuracy", "time", "error, m"], rows)
+        text += table(["program", "settings", "step, accuracy or tolerance", "time", "error, m"], rows)
     return text
 
 

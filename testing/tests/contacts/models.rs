@@ -6,7 +6,7 @@ use mbd_codegen::model::Model;
 use mbd_codegen::plan::Plan;
 use mbd_codegen::read;
 use mbd_runtime::constrained::{close, Closing};
-use mbd_runtime::contact::{Cause, Mode};
+use mbd_runtime::contact::{Cause, Mode, Touching};
 use mbd_runtime::spatial::{add3, dot3, scale3, Vec3};
 
 use super::scene::{Mechanism, Scene};
@@ -139,6 +139,36 @@ fn a_quadruped_hops_and_stands() {
     assert_eq!(scene.system.modes()[..4], [Mode::Stick; 4]);
     assert!(scene.v().iter().all(|v| v.abs() < 1e-2), "{:?}", scene.v());
     assert!(scene.q[2] > start + 0.05, "{}", scene.q[2]);
+}
+
+/// The feet of a quadruped that is symmetric reach the friction cone at the same instant, before they leave the floor. All of them
+/// slide then: none goes on sticking by a force that friction cannot give.
+#[test]
+fn feet_that_begin_to_slip_at_once_slide() {
+    for tolerance in [1e-8, 1e-10, 1e-12] {
+        let mut scene = begun("quadruped_hop");
+        scene.tolerance = tolerance;
+        let (mut t, mut together) = (0.0, 0);
+        while t < 0.04 {
+            scene.advance(0.04);
+            t = scene.motion.as_ref().expect("it has begun").time();
+            let modes = scene.system.modes().to_vec();
+            let forces = scene.system.clone().forces(t, &scene.q, &scene.p).to_vec();
+            for (contact, (mode, [normal, x, y])) in
+                scene.system.system().contacts().iter().zip(modes.iter().zip(&forces))
+            {
+                // Forces are of the order of 10 N.
+                let beyond = x.hypot(*y) - contact.friction * normal;
+                assert!(
+                    *mode == Mode::Open || beyond < 1e-6 && *normal > -1e-6,
+                    "{t} s: {mode:?}, {beyond:e} N, {normal} N"
+                );
+            }
+            together += usize::from(modes[..4] == [Mode::Slide; 4]);
+        }
+        assert!(together > 0 && scene.system.modes()[..4] == [Mode::Open; 4]);
+        assert!(scene.events.0.iter().filter(|event| event.cause == Cause::Slipped).count() < 4);
+    }
 }
 
 /// The pin crosses the clearance and strikes the bushing; it never leaves it.

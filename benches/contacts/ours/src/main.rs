@@ -1,10 +1,11 @@
-//! Times a motion with contacts within this process, at several tolerances, and prints where it ends.
+//! Times a motion with contacts within this process, by events at several tolerances and by time steps of several lengths, and
+//! prints where it ends.
 //!
-//! usage: contacts-ours MODEL TIME ROUNDS TOLERANCE...
+//! usage: contacts-ours MODEL TIME ROUNDS (TOLERANCE | steps:LENGTH)...
 //!
-//! A line of JSON says the mass, kg, and the kinetic and potential energy at the start, J. A line for each tolerance follows:
-//! the least time of all rounds, s, the evaluations of the rates, the times of the events, s, and the origins and centres of
-//! mass of all bodies in ground axes, m. The first round is not timed.
+//! A line of JSON says the mass, kg, and the kinetic and potential energy at the start, J. A line for each tolerance or length, s,
+//! follows: the least time of all rounds, s, the times of the events, s, and the origins and centres of mass of all bodies in
+//! ground axes, m. The first round is not timed. Time steps that do not find their impulses have no line.
 //! Machine code is made for what is asked for a few times in a set of modes, as generated code would be before the run, so
 //! that tolerances which come twice are timed with machine code the second time.
 
@@ -16,7 +17,9 @@ use multibody::codegen::plan::Plan;
 use multibody::codegen::Options;
 use multibody::runtime::catalogue;
 use multibody::runtime::constrained::{Effort, Projection, Stabilisation, WithPostStep};
-use multibody::runtime::contact::{ContactEvent, ContactObserver, Hybrid, ModeTable, WithContacts};
+use multibody::runtime::contact::{
+    ContactEvent, ContactObserver, Hybrid, HybridError, ModeTable, TimeStepping, WithContacts,
+};
 use multibody::runtime::integrate::{Step, Tolerances};
 use multibody::runtime::sweep::FrameState;
 use multibody::runtime::{Conjugate, Interpreter};
@@ -38,8 +41,8 @@ impl ContactObserver<Mechanism> for Times {
 
 fn main() -> Result<(), Failed> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [path, time, rounds, tolerances @ ..] = &arguments[..] else {
-        return Err("usage: contacts-ours MODEL TIME ROUNDS TOLERANCE...".into());
+    let [path, time, rounds, ways @ ..] = &arguments[..] else {
+        return Err("usage: contacts-ours MODEL TIME ROUNDS (TOLERANCE | steps:LENGTH)...".into());
     };
     let (time, rounds): (f64, usize) = (time.parse()?, rounds.parse()?);
     let model = Model::load(path)?;
@@ -50,33 +53,60 @@ fn main() -> Result<(), Failed> {
     mechanism.conjugate_momenta(&q, &v, &mut p);
     println!("{:?}", start(&plan, &q, &v));
     let mut system = WithContacts::new(mechanism);
-    for tolerance in tolerances {
-        let tolerance: f64 = tolerance.parse()?;
+    for way in ways {
         let mut least = f64::INFINITY;
-        let mut last = None;
+        let (mut end, mut times) = (q.clone(), Vec::new());
+        let mut done = true;
         for round in 0..=rounds {
             let clock = Instant::now();
-            let method = catalogue::explicit("verner9", &system, false).ok_or("no method of this name")?;
-            let effort = Effort { energy: f64::INFINITY, ..Effort::default() };
-            let method = WithPostStep::new(&system, method, Projection::new(&system, Stabilisation::Mass, effort));
-            let step = Step::Adaptive(Tolerances::new(tolerance));
-            let mut motion = Hybrid::new(&mut system, method, step, 0.0, &q, &p)?;
-            let mut times = Times::default();
-            motion.run(&mut system, time, &mut times)?;
-            let seconds = clock.elapsed().as_secs_f64();
-            if round > 0 {
-                least = least.min(seconds);
+            let mut state = (q.clone(), p.clone());
+            match way.strip_prefix("steps:") {
+                Some(length) => done &= by_time_steps(&mut system, time, length.parse()?, &mut state).is_ok(),
+                None => times = by_events(&mut system, time, way.parse()?, &mut state)?,
             }
-            let (mut q, mut p) = (q.clone(), p.clone());
-            motion.state(&system, &mut q, &mut p);
-            last = Some((q, times.0, motion.statistics().evaluations));
+            if round > 0 {
+                least = least.min(clock.elapsed().as_secs_f64());
+            }
+            end = state.0;
         }
-        let (q, times, evaluations) = last.ok_or("no rounds")?;
-        println!(
-            "{{\"tolerance\": {tolerance:e}, \"seconds\": {least:e}, \"evaluations\": {evaluations}, \
-             \"events\": {times:?}, \"places\": {:?}}}",
-            places(&plan, &q)
-        );
+        if done {
+            println!("{{\"way\": {way:?}, \"seconds\": {least:e}, \"events\": {times:?}, \"places\": {:?}}}", places(&plan, &end));
+        }
+    }
+    Ok(())
+}
+
+type State = (Vec<f64>, Vec<f64>);
+
+/// Moves a state from event to event for so many seconds, to a tolerance. Returns the times of the events, s.
+fn by_events(
+    system: &mut WithContacts<Mechanism>,
+    time: f64,
+    tolerance: f64,
+    (q, p): &mut State,
+) -> Result<Vec<f64>, Failed> {
+    let method = catalogue::explicit("verner9", system, false).ok_or("no method of this name")?;
+    let effort = Effort { energy: f64::INFINITY, ..Effort::default() };
+    let method = WithPostStep::new(system, method, Projection::new(system, Stabilisation::Mass, effort));
+    let step = Step::Adaptive(Tolerances::new(tolerance));
+    let mut motion = Hybrid::new(system, method, step, 0.0, q, p)?;
+    let mut times = Times::default();
+    motion.run(system, time, &mut times)?;
+    motion.state(system, q, p);
+    Ok(times.0)
+}
+
+/// Moves a state by time steps of a length, s, for so many seconds.
+fn by_time_steps(
+    system: &mut WithContacts<Mechanism>,
+    time: f64,
+    length: f64,
+    (q, p): &mut State,
+) -> Result<(), HybridError> {
+    // The models of this comparison have no loops, which would have to be kept closed.
+    let mut motion = TimeStepping::new(system, ());
+    for step in 0..(time / length).round() as u32 {
+        motion.step(system, f64::from(step) * length, length, q, p)?;
     }
     Ok(())
 }

@@ -52,18 +52,28 @@ where
             let [x, y] = system.tangential(k);
             let speed = (x * x + y * y).sqrt();
             let slides = speed.to_f64() > least;
+            let begins = self.begins_to_slip(system, k);
+            set(self.touching.begins.as_mut(), k, begins.is_some());
             let slip = match self.forced {
-                // The bodies begin to slide against the force that has reached the cone.
-                Some((contact, Cause::Slipped, [_, x, y])) if contact == k => {
-                    let size = (x * x + y * y).sqrt();
-                    Some([-(x / size), -(y / size)])
-                }
+                _ if begins.is_some() => begins,
                 // It may slide on, in the direction in which it is accelerated.
                 Some((contact, Cause::Stopped, _)) if contact == k && speed.to_f64() < CREEP => None,
                 _ => slides.then(|| [x / speed, y / speed]),
             };
             self.touching.set_slip(i, slip);
         }
+    }
+
+    /// The direction in which a contact begins to slide at an event of slip: against its force, which has reached the friction
+    /// cone. Where several do at once, as feet of a symmetric mechanism, none of them may wait for the others: one that slides alone
+    /// takes load off the rest, which then stick, and the other way round.
+    fn begins_to_slip(&self, system: &WithContacts<Y>, k: usize) -> Option<[Y::Scalar; 2]> {
+        let (contact, _, own) = self.forced.filter(|(_, cause, _)| *cause == Cause::Slipped)?;
+        let [normal, x, y] = if contact == k { own } else { system.force(k) };
+        let size = (x * x + y * y).sqrt();
+        let limit = system.contact(k).friction * normal;
+        let reached = || system.mode(k) == Mode::Stick && size >= limit - Y::Scalar::constant(SMALL) * limit;
+        (size > Y::Scalar::zero() && (contact == k || reached())).then(|| [-(x / size), -(y / size)])
     }
 
     /// Modes from the forces and accelerations of the problem.
@@ -87,6 +97,7 @@ where
                 _ => force <= unloaded && touching.with_impulses(c.row) > still,
             };
             if opens {
+                set(touching.begins.as_mut(), k, false);
                 continue;
             }
             set(touching.modes.as_mut(), k, Mode::Slide);
@@ -95,7 +106,6 @@ where
             }
             if let Some(direction) = slip {
                 set(touching.slip.as_mut(), k, direction);
-                set(touching.begins.as_mut(), k, cause == Some(Cause::Slipped));
                 continue;
             }
             let [x, y] = [touching.with_impulses(c.row + 1), touching.with_impulses(c.row + 2)];

@@ -18,6 +18,8 @@ pub(super) const TURN: f64 = 1.0;
 const STANDSTILL: f64 = 1e-10;
 /// Part of the force at the end of a stretch by which a contact pulls at its start, if it does not just begin to.
 const PULLS: f64 = 1e-3;
+/// Part of the normal force by which the force of a contact that sticks is beyond the friction cone, not on it.
+const BEYOND: f64 = 1e-9;
 /// How often a stretch is halved in search of a point where a gap is positive, and another function.
 const HALVINGS: [u32; 2] = [40, 4];
 
@@ -317,6 +319,10 @@ where
                 // The normal force has gone through infinity, not through zero.
                 None if which == 0 && at_a < Y::Scalar::constant(PULLS) * at_b && system.slides_on(k) => {
                     return Some(Found { contact: k, cause: Cause::Jammed, theta: from });
+                }
+                // A force that has just reached the friction cone has left it.
+                None if which == 1 && mode == Mode::Stick && at_b < -(Y::Scalar::constant(BEYOND) * b.first) => {
+                    return Some(Found { contact: k, cause, theta: from });
                 }
                 // Friction would act along the slip: the direction is taken anew.
                 None if which == 1 && at_a < zero && system.slides_on(k) => {
