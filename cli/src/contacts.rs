@@ -186,6 +186,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
     let (close, rules, start) = (projection(settings, &system), settings.regimes, (&q, &p));
     let motion = ContactMotion::new(&mut system, (method, settings.step), close, rules, 0.0, start);
     let mut motion = motion.map_err(failed)?;
+    motion.events.rules.order = settings.impacts;
     let mut progress = Progress::new(settings.time);
     for until in settings.instants() {
         while motion.time() < until && !interrupt::asked() {

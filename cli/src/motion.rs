@@ -13,7 +13,7 @@ use multibody::runtime::catalogue::{self, BoxedMethod};
 use multibody::runtime::constrained::{
     ConstraintError, Effort, PostStep, Projection, SingularPosition, Stabilisation, WithPostStep,
 };
-use multibody::runtime::contact::RegimeRules;
+use multibody::runtime::contact::{ImpactOrder, RegimeRules};
 use multibody::runtime::integrate::{Control, EnergyProjection, Solver, Statistics, Step, StepError};
 use multibody::runtime::{Constrained, Differentiable, Interpreter, Real, Scalar, System};
 
@@ -43,6 +43,8 @@ pub struct Settings<'a> {
     pub interpreted: bool,
     /// How contacts are followed.
     pub regimes: RegimeRules,
+    /// How contacts act that collide at the same instant.
+    pub impacts: ImpactOrder,
     /// What moves the joints, if anything does.
     pub control: Option<Rc<Controller>>,
 }

@@ -11,12 +11,12 @@ use multibody::codegen::plan::Plan;
 use multibody::codegen::words;
 use multibody::runtime::catalogue;
 use multibody::runtime::constrained::{SingularPosition, Stabilisation};
-use multibody::runtime::contact::{RegimeChoice, RegimeRules};
+use multibody::runtime::contact::{ImpactOrder, RegimeChoice, RegimeRules};
 use multibody::runtime::integrate::{Control, Statistics, Step, Tolerances};
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Interpreter, System};
 
-use super::args::{ContactRegime, MotionArgs, SimulateArgs, Trust};
+use super::args::{ContactRegime, Impacts, MotionArgs, SimulateArgs, Trust};
 use super::control::{Controller, Table};
 use super::motion::{simulate, Drift, Record, Settings, Spent};
 use super::output::{note, same_file, writable, write_files};
@@ -111,15 +111,14 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
         writable(file)?;
     }
     verdict::start(path, &plan, &q)?;
-    if model.contacts.is_empty() && args.record_modes.is_some() {
+    let of_contacts = [
+        ("--record-modes", args.record_modes.is_some()),
+        ("--contacts", args.motion.contacts != ContactRegime::Events),
+        ("--impacts", args.motion.impacts != Impacts::Together),
+    ];
+    if let (true, Some((name, _))) = (model.contacts.is_empty(), of_contacts.iter().find(|(_, given)| *given)) {
         return Err(Failure::new(
-            format!("--record-modes: `{}` has no contacts", model.name),
-            "leave it out, or add [[shape]] and [[contact]] to the model",
-        ));
-    }
-    if model.contacts.is_empty() && args.motion.contacts != ContactRegime::Events {
-        return Err(Failure::new(
-            format!("--contacts: `{}` has no contacts", model.name),
+            format!("{name}: `{}` has no contacts", model.name),
             "leave it out, or add [[shape]] and [[contact]] to the model",
         ));
     }
@@ -319,6 +318,10 @@ pub fn settings(args: &MotionArgs) -> Outcome<Settings<'_>> {
         hold: args.hold,
         interpreted: args.interpreted,
         regimes: regimes(args)?,
+        impacts: match args.impacts {
+            Impacts::Together => ImpactOrder::Simultaneous,
+            Impacts::Sequential => ImpactOrder::Sequential,
+        },
         control: None,
     })
 }
@@ -333,6 +336,7 @@ fn regimes(args: &MotionArgs) -> Outcome<RegimeRules> {
     if choice == RegimeChoice::TimeSteps {
         let given = [("--method", args.method.is_some()), ("--tolerance", args.tolerance.is_some())];
         let given = given.into_iter().chain([("--step", args.step.is_some()), ("--partial", args.partial)]);
+        let given = given.chain([("--impacts", args.impacts != Impacts::Together)]);
         let given: Vec<&str> = given.filter(|(_, given)| *given).map(|(name, _)| name).collect();
         if !given.is_empty() {
             return Err(Failure::new(

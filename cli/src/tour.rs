@@ -11,7 +11,7 @@ use multibody::codegen::read::{self, ImportOptions};
 use multibody::codegen::search;
 use multibody::codegen::{Options, Output};
 use multibody::runtime::constrained::Stabilisation;
-use multibody::runtime::contact::RegimeRules;
+use multibody::runtime::contact::{ImpactOrder, RegimeRules};
 use multibody::runtime::integrate::{Rk4, Step, Stepper};
 use multibody::runtime::Interpreter;
 
@@ -163,6 +163,7 @@ fn settings() -> Settings<'static> {
         hold: Stabilisation::default(),
         interpreted: true,
         regimes: RegimeRules::default(),
+        impacts: ImpactOrder::default(),
         control: None,
     }
 }

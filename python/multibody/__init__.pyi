@@ -228,6 +228,7 @@ class Model:
         events: Union[bool, Sequence[Union[Event, _EventFunction]], None] = ...,
         forces: bool = ...,
         contacts: Literal["automatic", "events", "steps"] = ...,
+        impacts: Literal["together", "sequential"] = ...,
         threads: Optional[int] = ...,
         out: Optional[Tuple[_Array, _Array]] = ...,
         on_error: Literal["raise", "mark"] = ...,

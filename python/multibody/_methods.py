@@ -167,6 +167,7 @@ def rollout(
     events: Any = None,
     forces: bool = False,
     contacts: str = "automatic",
+    impacts: str = "together",
     threads: Optional[int] = None,
     out: Any = None,
     on_error: str = "raise",
@@ -179,7 +180,6 @@ def rollout(
         ``dt``: step, s. Methods that choose their steps give a state after every ``dt``.
         ``steps``: number ``T`` of steps; that of ``u`` if it is given.
         ``method``: one of ``multibody.methods()``; ``"rk4"`` without a tolerance, ``"dop853"`` with one.
-            Models with contacts take these two alone.
         ``tolerance``: error that a step may have (rad and m for coordinates, relative for momenta): adaptive steps.
         ``state``: ``"velocities"`` or ``"momenta"``: what the second half of ``x0`` and of the result holds.
         ``layout``: order and representation of states and ``u``: ``"mbd"``, ``"pinocchio"`` or ``"mujoco"``.
@@ -194,6 +194,8 @@ def rollout(
         ``contacts``: how contacts are followed: ``"events"``, from event to event; ``"steps"``, by time steps of ``dt`` with the
             impulses of all contacts at once, whose error is of the first order in ``dt``; or ``"automatic"``, by events, and
             by time steps of 1 ms or less where these crowd or fail.
+        ``impacts``: how contacts act that collide at the same instant of a motion by events: ``"together"``, or
+            ``"sequential"``, the one whose bodies approach fastest, then the next, as in Newton's cradle.
         ``threads``: number of threads, all cores without; the results are the same bits for any number.
         ``out``: a pair of arrays for ``q`` and ``v``.
         ``on_error``: ``"raise"`` the failure of the first row that fails, or ``"mark"``: rows are NaN from where they failed.
@@ -242,6 +244,7 @@ def rollout(
         "momenta": state == "momenta",
         "layout": layout,
         "contacts": contacts,
+        "impacts": impacts,
         "threads": threads,
     }
     motion = Rollout(*self._rollout(start, u, settings, _asked(events, forces), _given(self, inputs), drives, out))

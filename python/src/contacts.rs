@@ -162,6 +162,7 @@ impl Motion<'_> {
         }
         let motion = ContactMotion::new(system, (method, step), close, rules, 0.0, (&state.q, &state.p));
         let mut motion = motion.map_err(|error| failed(&error))?;
+        motion.events.rules.order = self.impacts;
         let (nq, nv) = self.sizes;
         for step in 0..=self.settings.steps {
             let t = step as f64 * self.settings.dt;

@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use multibody::codegen::jit::Compiled;
 use multibody::codegen::output::Output;
-use multibody::runtime::contact::RegimeChoice;
+use multibody::runtime::contact::{ImpactOrder, RegimeChoice};
 use multibody::runtime::integrate::StepError;
 use multibody::runtime::layout::Layout;
 use multibody::runtime::{Conjugate, Constrained, System};
@@ -61,7 +61,7 @@ pub fn rollout<'py>(
     for output in [Output::Rates, Output::Velocities, Output::Momenta] {
         machines.prepare(py, output).map_err(|e| compile_error(py, &e))?;
     }
-    let regime = settings.regime(touches)?;
+    let (regime, impacts) = (settings.regime(touches)?, settings.impacts(touches)?);
     if touches {
         py.detach(|| machines.touching().map(|made| machines.keep(made))).map_err(|e| compile_error(py, &e))?;
     }
@@ -95,6 +95,7 @@ pub fn rollout<'py>(
             moving: moving.as_ref().map(|m| Ok::<_, PyErr>((m.q.rows()?, m.v.rows()?))).transpose()?,
             touches,
             regime,
+            impacts,
             asked: &asked,
             told: &told,
         };
@@ -125,6 +126,8 @@ pub struct Motion<'a> {
     /// Whether the model has contacts, and how they are followed.
     touches: bool,
     pub regime: RegimeChoice,
+    /// How contacts act that collide at the same instant.
+    pub impacts: ImpactOrder,
     pub asked: &'a Asked,
     pub told: &'a Told,
 }

@@ -2,7 +2,7 @@
 
 use multibody::codegen::plan::state_layout;
 use multibody::runtime::catalogue;
-use multibody::runtime::contact::RegimeChoice;
+use multibody::runtime::contact::{ImpactOrder, RegimeChoice};
 use multibody::runtime::layout::Layout;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -12,6 +12,10 @@ use crate::model::Model;
 /// The ways to follow contacts: events where they can be resolved and time steps elsewhere, events alone, time steps alone.
 const REGIMES: [(&str, RegimeChoice); 3] =
     [("automatic", RegimeChoice::Automatic), ("events", RegimeChoice::Events), ("steps", RegimeChoice::TimeSteps)];
+
+/// How contacts act that collide at the same instant.
+const ORDERS: [(&str, ImpactOrder); 2] =
+    [("together", ImpactOrder::Simultaneous), ("sequential", ImpactOrder::Sequential)];
 
 /// How motions are computed; a dictionary of Python.
 #[derive(FromPyObject)]
@@ -25,6 +29,7 @@ pub struct Settings {
     pub momenta: bool,
     layout: String,
     contacts: String,
+    impacts: String,
     pub threads: Option<usize>,
 }
 
@@ -76,6 +81,25 @@ impl Settings {
                 "time steps have the length `dt`: leave `tolerance` out, or take contacts=\"events\"".into()
             }
             Some((_, choice)) => return Ok(*choice),
+        };
+        Err(PyValueError::new_err(words))
+    }
+
+    /// How contacts act that collide at the same instant: one of [`ORDERS`].
+    ///
+    /// # Errors
+    /// Another word; one where nothing is followed from event to event.
+    pub fn impacts(&self, touches: bool) -> PyResult<ImpactOrder> {
+        let found = ORDERS.iter().find(|(name, _)| *name == self.impacts);
+        let words = match found {
+            None => {
+                let names: Vec<&str> = ORDERS.iter().map(|(name, _)| *name).collect();
+                format!("contacts do not collide `{}`: take {}", self.impacts, names.join(" or "))
+            }
+            Some((name, order)) if *order != ImpactOrder::default() && (!touches || self.contacts == "steps") => {
+                format!("`impacts` is `{name}`, but no impacts are looked for: the model has no contacts, or moves by time steps")
+            }
+            Some((_, order)) => return Ok(*order),
         };
         Err(PyValueError::new_err(words))
     }

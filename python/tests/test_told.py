@@ -53,6 +53,18 @@ def test_zeros_of_functions(pendulum, settings):
     np.testing.assert_allclose(motion.q, pendulum.rollout(([amplitude], [0.0]), **settings).q, atol=1e-11)
 
 
+def test_contacts_collide_together_or_one_after_the_other():
+    """Newton's cradle: the last ball flies on alone, or two do."""
+    cradle = multibody.load(MODELS / "contacts" / "newtons_cradle.toml", search=False)
+    ends = [cradle.rollout(cradle.start(), dt=0.01, steps=50, tolerance=1e-9, impacts=how).v[-1] for how in ("together", "sequential")]
+    assert abs(ends[1][:2]).max() < 1e-6 < 0.5 < ends[1][2]
+    np.testing.assert_allclose(ends[0] / ends[1][2], [-1 / 3, 2 / 3, 2 / 3], atol=0.02)
+    with pytest.raises(ValueError, match="contacts do not collide `both`: take together or sequential"):
+        cradle.rollout(cradle.start(), dt=0.01, steps=5, impacts="both")
+    with pytest.raises(ValueError, match="no impacts are looked for"):
+        cradle.rollout(cradle.start(), dt=0.01, steps=5, impacts="sequential", contacts="steps")
+
+
 def test_terminal_events_end_their_rows(pendulum):
     starts = (np.array([[1.0], [0.5], [1.2]]), np.zeros((3, 1)))
     stop = multibody.Event(lambda t, q, v: q[0], "falling", terminal=True)

@@ -486,6 +486,9 @@ pub struct MotionArgs {
     /// Time step of `--contacts stepping` and `auto`, s
     #[arg(long, value_name = "S", value_parser = positive, default_value_t = 1e-3)]
     pub contact_step: f64,
+    /// How contacts act that collide at the same instant, in motions by events
+    #[arg(long, value_enum, value_name = "HOW", default_value = "together")]
+    pub impacts: Impacts,
     /// How loops are kept closed
     #[arg(long, value_parser = one_of(HOLD), default_value = "mass")]
     pub hold: Stabilisation,
@@ -517,6 +520,15 @@ pub enum ContactRegime {
     Stepping,
     /// From event to event, and by time steps while events crowd or cannot be resolved; the report says when
     Auto,
+}
+
+/// How contacts act that collide at the same instant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Impacts {
+    /// All at once
+    Together,
+    /// The one whose bodies approach fastest, then the next, until none approach: Newton's cradle
+    Sequential,
 }
 
 /// The second run of `--trust`.

@@ -12,7 +12,7 @@ use multibody::codegen::options::PlanOptions;
 use multibody::codegen::plan::Plan;
 use multibody::codegen::read::ImportOptions;
 use multibody::runtime::constrained::Stabilisation;
-use multibody::runtime::contact::{RegimeChoice, RegimeRules};
+use multibody::runtime::contact::{ImpactOrder, RegimeChoice, RegimeRules};
 use multibody::runtime::integrate::Step;
 use multibody::runtime::sweep::FrameState;
 use multibody::runtime::transfer::quaternion;
@@ -69,6 +69,7 @@ fn moved(path: &Path, plan: &Plan, time: f64) -> Outcome<Record> {
         hold: Stabilisation::default(),
         interpreted: false,
         regimes: RegimeRules::new(RegimeChoice::Automatic, 1e-3),
+        impacts: ImpactOrder::default(),
         control: None,
     };
     let (mut q, mut v) = (default_start(plan), default_velocity(plan));

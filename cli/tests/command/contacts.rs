@@ -94,6 +94,33 @@ fn contacts_are_followed_by_time_steps() {
     bad(run_in(&folder, &without), &["--contacts: `double_pendulum` has no contacts"]);
 }
 
+/// The first ball of the cradle strikes two that touch.
+#[test]
+fn contacts_collide_together_or_one_after_the_other() {
+    let folder = folder("contacts_impacts");
+    let speeds = |how: &[&str]| -> Vec<f64> {
+        let cradle = shipped("newtons_cradle");
+        let arguments = ["simulate", &cradle, "--time", "0.5", "--rows", "3", "--columns", "v"];
+        good(run_in(&folder, &[&arguments, how].concat()));
+        let table = std::fs::read_to_string(folder.join("newtons_cradle.csv")).expect("a table");
+        let last = table.lines().last().expect("a row");
+        last.split(',').skip(1).map(|x| x.parse().expect("a number")).collect()
+    };
+    let (together, sequential) = (speeds(&[]), speeds(&["--impacts", "sequential"]));
+    let fastest = sequential[2];
+    assert!(fastest > 0.5 && sequential[..2].iter().all(|v| v.abs() < 1e-6), "{sequential:?}");
+    // -1/3, 2/3, 2/3 where they act together; all swing back by the same law, apart from the sine of small angles.
+    let parts: Vec<f64> = together.iter().map(|v| v / fastest).collect();
+    let near = |a: f64, b: f64| (a - b).abs() < 0.02;
+    assert!(near(parts[0], -1.0 / 3.0) && near(parts[1], 2.0 / 3.0) && near(parts[2], 2.0 / 3.0), "{parts:?}");
+    let cradle = shipped("newtons_cradle");
+    let steps = ["simulate", &cradle, "--contacts", "stepping", "--impacts", "sequential"];
+    bad(run_in(&folder, &steps), &["--contacts stepping has a method of its own, for which --impacts means nothing"]);
+    let pendulum = format!("{ROOT}/models/double_pendulum.toml");
+    let without = ["simulate", &pendulum, "--impacts", "sequential"];
+    bad(run_in(&folder, &without), &["--impacts: `double_pendulum` has no contacts"]);
+}
+
 #[test]
 fn modes_are_recorded_counted_and_generated() {
     let folder = folder("contacts_modes");
