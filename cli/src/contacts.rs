@@ -36,6 +36,8 @@ pub struct Touched {
     pub record: Record,
     /// Its events, in the order of time.
     pub events: Vec<ContactEvent<f64>>,
+    /// What time steps have in their place.
+    pub presses: Vec<Press>,
     /// What happened at the contacts, followed by events.
     pub contacts: ContactStatistics,
     /// What happened at the contacts in time steps.
@@ -57,6 +59,14 @@ pub struct Touched {
 }
 
 /// Keeps rows and events.
+/// In time steps, a contact begins to press, or no longer does.
+pub struct Press {
+    /// The end of the step, s.
+    time: f64,
+    contact: usize,
+    begins: bool,
+}
+
 struct Observer {
     record: Record,
     events: Vec<ContactEvent<f64>>,
@@ -188,9 +198,20 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
     let mut motion = motion.map_err(failed)?;
     motion.events.rules.order = settings.impacts;
     let mut progress = Progress::new(settings.time);
+    let (mut pressed, mut presses) = (vec![false; system.modes().len()], Vec::new());
     for until in settings.instants() {
         while motion.time() < until && !interrupt::asked() {
             motion.advance(&mut system, until, &mut observer).inspect_err(|_| progress.clear()).map_err(failed)?;
+            for (contact, pressed) in pressed.iter_mut().enumerate() {
+                let now = match motion.regime() {
+                    Regime::Events => system.modes()[contact] != Mode::Open,
+                    Regime::TimeSteps => motion.steps.pressed()[contact],
+                };
+                if motion.regime() == Regime::TimeSteps && now != *pressed {
+                    presses.push(Press { time: motion.time(), contact, begins: now });
+                }
+                *pressed = now;
+            }
             progress.show(motion.time());
         }
         if let Some(control) = settings.control.as_ref().filter(|_| until < settings.time) {
@@ -207,6 +228,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
     Ok(Touched {
         record: Record { statistics, ..observer.record },
         events: observer.events,
+        presses,
         forces: observer.forces.unwrap_or_default(),
         visits: observer.visits,
         contacts: *motion.contact_statistics(),
@@ -388,21 +410,26 @@ pub fn report(plan: &Plan, touched: &Touched, choice: RegimeChoice, out: &mut dy
     Ok(())
 }
 
-/// The events as a table.
-pub fn table(plan: &Plan, events: &[ContactEvent<f64>]) -> String {
-    let mut text = String::from("t,contact,event,mode,approach,energy\n");
-    for event in events {
+/// The events as a table, and in time steps where a contact begins to press or no longer does: at the ends of steps, whose
+/// impulses have no speed of approach and no energy of one contact. Returns the number of rows, too.
+pub fn table(plan: &Plan, touched: &Touched) -> (String, usize) {
+    let contact = |k: usize| super::columns::quoted(name(plan, k));
+    let events = touched.events.iter().map(|event| {
         let energy = event.impact.map_or(0.0, |impact| impact.energy);
         let (what, then) = (event.cause.verb(), mode(plan, event.contact, event.modes[1]));
-        let _ = writeln!(
-            text,
-            "{},{},{what},{then},{},{energy}",
-            event.time,
-            super::columns::quoted(name(plan, event.contact)),
-            event.approach
-        );
-    }
-    text
+        (event.time, format!("{},{what},{then},{},{energy}", contact(event.contact), event.approach))
+    });
+    let presses = touched.presses.iter().map(|press| {
+        let what = if press.begins { "presses,closed" } else { "parts,open" };
+        (press.time, format!("{},{what},,", contact(press.contact)))
+    });
+    let mut rows: Vec<(f64, String)> = events.chain(presses).collect();
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let text = rows.iter().fold(String::from("t,contact,event,mode,approach,energy\n"), |mut text, (time, rest)| {
+        let _ = writeln!(text, "{time},{rest}");
+        text
+    });
+    (text, rows.len())
 }
 
 /// Name of the file with the events beside the table of the motion.

@@ -238,7 +238,7 @@ fn with_contacts(
     let record = &touched.record;
     let plot = plot::svg(&title(plan, settings), &panels(plan, record));
     let table = columns::table_with(plan, settings, record, columns, &touched.forces)?.file(csv)?;
-    let (events, beside) = (contacts::table(plan, &touched.events), contacts::beside(csv));
+    let ((events, count), beside) = (contacts::table(plan, &touched), contacts::beside(csv));
     let mut files = vec![(csv, table.as_slice()), (svg, plot.as_bytes()), (beside.as_path(), events.as_bytes())];
     let motion = args.picture.as_deref().map(|file| (file, picture::svg(plan, record, &touched.forces, drawing)));
     files.extend(motion.as_ref().map(|(file, text)| (*file, text.as_bytes())));
@@ -258,7 +258,7 @@ fn with_contacts(
         pace(args.motion.time / seconds),
         contacts::ways(&touched, settings.regimes.choice)
     )?;
-    let (rows, count) = (record.t.len(), touched.events.len());
+    let rows = record.t.len();
     writeln!(out, "table: {} ({rows} rows)\nevents: {} ({count} rows)", csv.display(), beside.display())?;
     writeln!(out, "plot: {}", svg.display())?;
     if let Some(file) = &args.picture {

@@ -78,6 +78,13 @@ fn contacts_are_followed_by_time_steps() {
     assert!(report.contains("3 s of free motion by time steps of 0.0001 s"), "{report}");
     assert!(report.contains("regimes: 0.000000 s by events, 3.000000 s by time steps, 0 changes"), "{report}");
     assert!(report.contains("time steps: 30000, "), "{report}");
+    // A landing presses in both steps between whose middles it is, and parts in the step after.
+    let table = std::fs::read_to_string(folder.join("bouncing_ball_events.csv")).expect("a table");
+    let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let first: f64 = rows[0][0].parse().expect("a time");
+    assert!((first - (2.0_f64 / 9.81).sqrt()).abs() < 2e-4, "{first}");
+    let kinds = |from: usize| rows.iter().skip(from).step_by(2).map(|row| row[2]).collect::<Vec<_>>();
+    assert_eq!((kinds(0), kinds(1)), (vec!["presses"; 6], vec!["parts"; 6]));
     // Each of six landings at up to 4.4 m/s is late by up to a step.
     assert!((height - exact).abs() < 6.0 * 2.0 * 4.4 * 1e-4, "{height} {exact}");
     // Few events: nothing changes.
