@@ -58,7 +58,6 @@ pub struct Touched {
     pub seconds: f64,
 }
 
-/// Keeps rows and events.
 /// In time steps, a contact begins to press, or no longer does.
 pub struct Press {
     /// The end of the step, s.
@@ -67,6 +66,7 @@ pub struct Press {
     begins: bool,
 }
 
+/// Keeps rows and events.
 struct Observer {
     record: Record,
     events: Vec<ContactEvent<f64>>,
