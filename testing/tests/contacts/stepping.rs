@@ -88,7 +88,7 @@ pub fn shipped(text: &str) -> (Model, Vec<f64>) {
 }
 
 /// Largest difference between the ends of a motion by events and of one by steps.
-fn error(model: &Model, q: &[f64], v: &[f64], time: f64, n: u32) -> f64 {
+pub fn error(model: &Model, q: &[f64], v: &[f64], time: f64, n: u32) -> f64 {
     let mut events = Scene::new(model.clone(), q, v);
     events.run(time);
     let mut stepped = Stepped::new(model, q, v);
