@@ -66,6 +66,29 @@ pub struct Press {
     begins: bool,
 }
 
+/// Which contacts press, and where that changes in time steps.
+struct Presses {
+    pressed: Vec<bool>,
+    changes: Vec<Press>,
+}
+
+impl Presses {
+    /// By events: contacts that are closed press.
+    fn closed(&mut self, modes: &[Mode]) {
+        self.pressed.iter_mut().zip(modes).for_each(|(pressed, mode)| *pressed = *mode != Mode::Open);
+    }
+
+    /// A time step has ended in which these contacts press.
+    fn step(&mut self, time: f64, now: &[bool]) {
+        for (contact, (pressed, begins)) in self.pressed.iter_mut().zip(now).enumerate() {
+            if begins != pressed {
+                self.changes.push(Press { time, contact, begins: *begins });
+            }
+            *pressed = *begins;
+        }
+    }
+}
+
 /// Keeps rows and events.
 struct Observer {
     record: Record,
@@ -198,19 +221,13 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
     let mut motion = motion.map_err(failed)?;
     motion.events.rules.order = settings.impacts;
     let mut progress = Progress::new(settings.time);
-    let (mut pressed, mut presses) = (vec![false; system.modes().len()], Vec::new());
+    let mut presses = Presses { pressed: vec![false; system.modes().len()], changes: Vec::new() };
     for until in settings.instants() {
         while motion.time() < until && !interrupt::asked() {
             motion.advance(&mut system, until, &mut observer).inspect_err(|_| progress.clear()).map_err(failed)?;
-            for (contact, pressed) in pressed.iter_mut().enumerate() {
-                let now = match motion.regime() {
-                    Regime::Events => system.modes()[contact] != Mode::Open,
-                    Regime::TimeSteps => motion.steps.pressed()[contact],
-                };
-                if motion.regime() == Regime::TimeSteps && now != *pressed {
-                    presses.push(Press { time: motion.time(), contact, begins: now });
-                }
-                *pressed = now;
+            match motion.regime() {
+                Regime::Events => presses.closed(system.modes()),
+                Regime::TimeSteps => presses.step(motion.time(), motion.steps.pressed()),
             }
             progress.show(motion.time());
         }
@@ -228,7 +245,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
     Ok(Touched {
         record: Record { statistics, ..observer.record },
         events: observer.events,
-        presses,
+        presses: presses.changes,
         forces: observer.forces.unwrap_or_default(),
         visits: observer.visits,
         contacts: *motion.contact_statistics(),

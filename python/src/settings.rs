@@ -17,6 +17,12 @@ const REGIMES: [(&str, RegimeChoice); 3] =
 const ORDERS: [(&str, ImpactOrder); 2] =
     [("together", ImpactOrder::Simultaneous), ("sequential", ImpactOrder::Sequential)];
 
+/// What a word stands for; all words if it is none of them.
+fn named<T: Copy>(all: &[(&'static str, T)], word: &str) -> Result<T, Vec<&'static str>> {
+    let found = all.iter().find(|(name, _)| *name == word);
+    found.map(|(_, of)| *of).ok_or_else(|| all.iter().map(|(name, _)| *name).collect())
+}
+
 /// How motions are computed; a dictionary of Python.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -68,19 +74,15 @@ impl Settings {
     /// # Errors
     /// Another word; one for a model without contacts; time steps with a tolerance.
     pub fn regime(&self, touches: bool) -> PyResult<RegimeChoice> {
-        let found = REGIMES.iter().find(|(name, _)| *name == self.contacts);
-        let words = match found {
-            None => {
-                let names: Vec<&str> = REGIMES.iter().map(|(name, _)| *name).collect();
-                format!("contacts are not followed by `{}`: take {}", self.contacts, names.join(", "))
+        let words = match named(&REGIMES, &self.contacts) {
+            Err(names) => format!("contacts are not followed by `{}`: take {}", self.contacts, names.join(", ")),
+            Ok(choice) if !touches && choice != RegimeChoice::Automatic => {
+                format!("the model has no contacts that `{}` could follow", self.contacts)
             }
-            Some((name, choice)) if !touches && *choice != RegimeChoice::Automatic => {
-                format!("the model has no contacts that `{name}` could follow")
-            }
-            Some((_, RegimeChoice::TimeSteps)) if self.tolerance.is_some() => {
+            Ok(RegimeChoice::TimeSteps) if self.tolerance.is_some() => {
                 "time steps have the length `dt`: leave `tolerance` out, or take contacts=\"events\"".into()
             }
-            Some((_, choice)) => return Ok(*choice),
+            Ok(choice) => return Ok(choice),
         };
         Err(PyValueError::new_err(words))
     }
@@ -90,16 +92,13 @@ impl Settings {
     /// # Errors
     /// Another word; one where nothing is followed from event to event.
     pub fn impacts(&self, touches: bool) -> PyResult<ImpactOrder> {
-        let found = ORDERS.iter().find(|(name, _)| *name == self.impacts);
-        let words = match found {
-            None => {
-                let names: Vec<&str> = ORDERS.iter().map(|(name, _)| *name).collect();
-                format!("contacts do not collide `{}`: take {}", self.impacts, names.join(" or "))
+        let words = match named(&ORDERS, &self.impacts) {
+            Err(names) => format!("contacts do not collide `{}`: take {}", self.impacts, names.join(" or ")),
+            Ok(order) if order != ImpactOrder::default() && (!touches || self.contacts == "steps") => {
+                let order = &self.impacts;
+                format!("`impacts` is `{order}`, but no impacts are looked for: the model has no contacts, or moves by time steps")
             }
-            Some((name, order)) if *order != ImpactOrder::default() && (!touches || self.contacts == "steps") => {
-                format!("`impacts` is `{name}`, but no impacts are looked for: the model has no contacts, or moves by time steps")
-            }
-            Some((_, order)) => return Ok(*order),
+            Ok(order) => return Ok(order),
         };
         Err(PyValueError::new_err(words))
     }
