@@ -98,6 +98,8 @@ impl<S: Scalar> Interpreter<S> {
                 }
             }
         }
+        // Nodes stand in the order of the elimination.
+        groups.sort_by_key(|group| group.q);
         Interpreter {
             tau: vec![o; dims.nv],
             drive_q,

@@ -23,6 +23,9 @@ pub struct LoopKnobs {
     /// Whether all joints are revolute and prismatic joints of one plane. A loop that is closed by a joint then has
     /// redundant rows.
     pub planar: bool,
+    /// Whether all loops bind bodies of other branches from the ground to one body of the first branch, like legs to a
+    /// platform.
+    pub platform: bool,
     /// Smallest and largest number of constraints.
     pub count: (usize, usize),
     /// Probability that one end of a loop is on the ground.
@@ -45,6 +48,7 @@ impl LoopKnobs {
         LoopKnobs {
             tree: Distribution { bodies: (3, 8), ..Distribution::default() },
             planar: false,
+            platform: false,
             count: (1, 3),
             ground: 0.6,
             twice: 0.0,
@@ -53,6 +57,14 @@ impl LoopKnobs {
             decay: 0.0,
             locked: 0.0,
         }
+    }
+
+    /// Platforms on legs of all kinds of joints, with loops of every kind.
+    pub fn platforms(seed: u64) -> LoopKnobs {
+        let everything = LoopKnobs::everything(seed, 10);
+        // One branch after the other, each of two or three bodies; coordinates that branches share couple these.
+        let tree = Distribution { bodies: (8, 12), roots: 0.4, branching: 0.1, mimic: 0.05, ..everything.tree };
+        LoopKnobs { tree, platform: true, count: (3, 6), coupling: 0.05, ..everything }
     }
 
     /// All kinds of joints and constraints on up to `bodies` bodies; the probabilities themselves are random.
@@ -73,6 +85,7 @@ impl LoopKnobs {
         LoopKnobs {
             tree,
             planar,
+            platform: false,
             count: (1, 4),
             ground: rng.pick(&[0.0, 0.4, 0.8]),
             twice: if rng.chance(0.2) { 0.4 } else { 0.0 },
@@ -269,12 +282,26 @@ impl Closer<'_> {
         only(&a, &b).iter().chain(&only(&b, &a)).map(moves).sum()
     }
 
+    /// The body on the ground that a body is carried by.
+    fn root(&self, body: usize) -> usize {
+        let parent =
+            |&at: &usize| self.model.joints.iter().find(|joint| joint.child == at).and_then(|joint| joint.parent);
+        std::iter::successors(Some(body), parent).last().unwrap_or(body)
+    }
+
     fn closed_loop(&mut self) -> Option<ConstraintKind> {
         let n = self.model.bodies.len();
         let kind = self.kind();
         for _ in 0..20 {
-            let ground = self.rng.chance(self.distribution.ground);
+            let ground = !self.distribution.platform && self.rng.chance(self.distribution.ground);
             let mut ends = [Some(self.rng.below(n)), if ground { None } else { Some(self.rng.below(n)) }];
+            if self.distribution.platform {
+                let platform = (0..n).take_while(|&body| self.root(body) == self.root(0)).last();
+                if ends[0].is_some_and(|body| self.root(body) == self.root(0)) {
+                    continue;
+                }
+                ends[1] = platform;
+            }
             if self.rng.chance(0.5) {
                 ends.swap(0, 1);
             }

@@ -1,10 +1,12 @@
 //! Splits joints into elementary joints, and merges bodies that are connected by fixed joints.
 
+use std::collections::BTreeSet;
+
 use mbd_runtime::tree::Kind;
 
 use super::placement::{direction, placement, rotation};
 use super::structure::PoseStep;
-use crate::model::{Model, Value};
+use crate::model::{ConstraintKind, Model, Value};
 
 /// An elementary joint. Its *element frame* is the child body's frame, or for the first half of a joint of two halves
 /// that frame at zero coordinates of the second.
@@ -44,7 +46,7 @@ pub struct Elements {
 pub fn elements(model: &Model, snap: f64, notices: &mut Vec<String>) -> Elements {
     let mut list: Vec<Element> = Vec::new();
     let mut bodies: Vec<Carried> = vec![(None, Vec::new()); model.bodies.len()];
-    for (k, joint) in model.joints.iter().enumerate() {
+    for (k, joint) in platforms_first(model).into_iter().map(|k| (k, &model.joints[k])) {
         let mut worst = 0.0_f64;
         let mut note = |off: f64| worst = worst.max(off);
         let (carrier, mut pose) = joint.parent.map_or((None, Vec::new()), |b| bodies[b].clone());
@@ -72,4 +74,29 @@ pub fn elements(model: &Model, snap: f64, notices: &mut Vec<String>) -> Elements
     let frames = frames.collect();
     let axes = model.bodies.iter().map(|b| rotation(&b.inertia_axes, snap, &mut |_| {}));
     Elements { inertia_axes: axes.collect(), list, bodies, frames }
+}
+
+/// Numbers of the joints, parents first: in the order of the model, but branches from the ground that loops bind to several
+/// others come before them, so that they are eliminated after these ([`super::early`]).
+fn platforms_first(model: &Model) -> Vec<usize> {
+    // Of every body, the first joint that moves on its way from the ground.
+    let mut roots: Vec<Option<usize>> = vec![None; model.bodies.len()];
+    for (k, joint) in model.joints.iter().enumerate() {
+        let inner = joint.parent.and_then(|body| roots[body]);
+        roots[joint.child] = inner.or((joint.kind.nv() > 0).then_some(k));
+    }
+    let mut bound = vec![BTreeSet::new(); model.joints.len()];
+    for constraint in &model.constraints {
+        let ConstraintKind::Loop { first, second, .. } = &constraint.kind else { continue };
+        if let [Some(a), Some(b)] = [first, second].map(|mount| mount.body.and_then(|body| roots[body])) {
+            if a != b {
+                bound[a].insert(b);
+                bound[b].insert(a);
+            }
+        }
+    }
+    let mut order: Vec<usize> = (0..model.joints.len()).collect();
+    // Bodies that are fixed to the ground carry others, and have no elements.
+    order.sort_by_key(|&k| roots[model.joints[k].child].map(|root| bound[root].len() < 2));
+    order
 }

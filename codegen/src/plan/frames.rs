@@ -51,7 +51,8 @@ pub fn choose(model: &Model, elements: &Elements, slots: &[Slot], mounts: &[Opti
         nodes.push(node(model, elements, slots, k, way, (c, s), h));
     }
     add_inertias(model, elements, &inside, &mut nodes);
-    let joint_nodes: Vec<usize> = (0..nodes.len()).filter(|&k| elements.list[k].last).collect();
+    let mut joint_nodes: Vec<usize> = (0..nodes.len()).filter(|&k| elements.list[k].last).collect();
+    joint_nodes.sort_by_key(|&k| elements.list[k].joint);
     let frames = named_frames(model, elements, &inside, &joint_nodes);
     let mounts = mounts.iter().map(|m| m.as_ref().map(|m| m.each_ref().map(|c| carried_frame("", c, &inside))));
     let mounts = mounts.collect();

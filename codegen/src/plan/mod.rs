@@ -6,6 +6,7 @@ mod branch;
 mod build;
 mod chain;
 mod constraints;
+mod early;
 mod elements;
 mod frames;
 mod instantiate;

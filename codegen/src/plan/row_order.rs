@@ -4,10 +4,11 @@
 use std::collections::BTreeMap;
 
 use mbd_runtime::integrate::Chart;
-use mbd_runtime::tree::row_order::{order_rows, reorder_rows, row_of, RowLists, RowProducts, FEWEST};
+use mbd_runtime::tree::row_order::{order_rows, reorder_rows, row_of, solve_late, RowLists, RowProducts, FEWEST};
 use mbd_runtime::tree::{Elimination, Unknown, PASSES};
 use mbd_runtime::Interpreter;
 
+use super::early;
 use super::structure::{Plan, RowsThatAct};
 
 /// A row is taken in the order of the description if its relative pivot is at least this part of the largest one.
@@ -22,10 +23,16 @@ impl RowLists for Plan {
     fn parent(&self, node: usize) -> Option<usize> {
         self.nodes[node].parent
     }
-    fn elimination(&mut self, node: usize) -> &mut Elimination {
+    fn elimination(&self, node: usize) -> &Elimination {
+        &self.nodes[node].elimination
+    }
+    fn elimination_mut(&mut self, node: usize) -> &mut Elimination {
         &mut self.nodes[node].elimination
     }
-    fn ground(&mut self) -> &mut Vec<usize> {
+    fn ground(&self) -> &[usize] {
+        &self.solve_at_ground
+    }
+    fn ground_mut(&mut self) -> &mut Vec<usize> {
         &mut self.solve_at_ground
     }
     fn row(&self, unknown: usize) -> Option<usize> {
@@ -40,6 +47,14 @@ impl RowLists for Plan {
 pub(super) fn order(plan: &mut Plan) {
     // Most models have no rows at all.
     if plan.dims.rows >= FEWEST {
+        if let Some(mut early) = early::with_early_rows(plan) {
+            let products = products(&early);
+            order_rows(&mut early, products, LARGE);
+            if early::saves_operations(&early) {
+                *plan = early;
+                return;
+            }
+        }
         order_rows(plan, products(plan), LARGE);
     }
 }
@@ -60,7 +75,8 @@ impl Plan {
 impl Plan {
     /// Gives the rows that are solved at the same node, where they are [`FEWEST`] or more, a place among the unknowns for
     /// each of the [passes](PASSES): those of one pass after those of the pass before it. Such an elimination does not
-    /// depend on the order of the rows. Plans with rolled code stay as they are.
+    /// depend on the order of the rows; rows of legs, of which a leg may be unable to follow some, are solved at the ground.
+    /// Plans with rolled code stay as they are.
     pub(crate) fn eliminate_rows_in_passes(&mut self) {
         if let Some(other) = &mut self.accelerations {
             other.eliminate_rows_in_passes();
@@ -68,6 +84,7 @@ impl Plan {
         if self.nodes.iter().any(|node| node.rolled) {
             return;
         }
+        solve_late(self);
         let (mut alone, mut together) = (Vec::new(), Vec::new());
         let nodes = self.nodes.iter().map(|node| &node.elimination);
         let lists = nodes.flat_map(|e| [&e.solve_before, &e.solve_after]).chain([&self.solve_at_ground]);

@@ -6,11 +6,16 @@
 //! its constraints must not matter; rows are therefore ordered by their pivots, as a factorization with diagonal pivoting
 //! would. The sweeps have no branches: the order belongs to the tree. It is chosen when a plan is made, and anew where
 //! rows become nearly dependent during a motion ([`crate::Constrained::reorder_rows`]).
+//!
+//! The legs of a platform, which start at the ground, bind it by rows that their own joints can follow. Such rows are *early*:
+//! they are solved at the platform before its own freedoms, as soon as the leg has been eliminated (see
+//! [`early_rows`]). What a leg cannot follow by itself waits for the ground.
 
+use alloc::collections::BTreeSet;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::{Elimination, Tree, Unknown};
+use super::{Elimination, Source, Tree, Unknown};
 use crate::system::{Constrained, Real};
 use crate::Interpreter;
 
@@ -18,14 +23,22 @@ use crate::Interpreter;
 const SMALL: f64 = 1e-3;
 /// A row of which less is left is redundant, and waits for nothing.
 const NOTHING: f64 = 1e-12;
+/// An early row of which less than this part can be followed by the joints that are eliminated before it waits for the ground.
+const EARLY: f64 = 1e-2;
 
-/// `Φ D⁻¹Φᵀ` at a position, with the diagonal `D` of the mass matrix, without the rows that have been eliminated.
+/// `Φ D⁻¹Φᵀ` at a position, with the diagonal `D` of the mass matrix, without the rows that have been eliminated. Velocities
+/// that are eliminated after early rows stand behind the rows until then: `[Φ D⁻¹Φᵀ, Φ_l; Φ_lᵀ, −1]`.
 #[derive(Clone, Debug)]
 pub struct RowProducts {
+    /// Number of rows and late velocities.
     n: usize,
     a: Vec<f64>,
-    /// The diagonal at first.
+    /// The diagonal of the rows without what has been taken off it by other rows.
     whole: Vec<f64>,
+    /// The diagonal of the rows by all velocities.
+    full: Vec<f64>,
+    /// Nodes of the late velocities.
+    late: Vec<usize>,
 }
 
 impl RowProducts {
@@ -47,10 +60,30 @@ impl RowProducts {
             dense
         };
         let scaled: Vec<Vec<f64>> = interpreter.rows().iter().map(dense).collect();
-        let n = scaled.len();
-        let product = |k: usize| scaled[k / n].iter().zip(&scaled[k % n]).map(|(a, b)| a * b).sum();
-        let a: Vec<f64> = (0..n * n).map(product).collect();
-        RowProducts { n, whole: (0..n).map(|r| a[r * n + r]).collect(), a }
+        let (mut late, mut late_velocities) = (Vec::new(), Vec::new());
+        for i in late_nodes(interpreter.tree()) {
+            let node = &interpreter.tree().nodes[i];
+            if let Source::State { v, .. } = node.source {
+                late_velocities.extend(v..v + node.kind.nv());
+                late.resize(late_velocities.len(), i);
+            }
+        }
+        let rows = scaled.len();
+        let n = rows + late.len();
+        let mut a = vec![0.0; n * n];
+        for (r, one) in scaled.iter().enumerate() {
+            for (s, other) in scaled.iter().enumerate() {
+                let early = (0..nv).filter(|v| !late_velocities.contains(v));
+                a[r * n + s] = early.map(|v| one[v] * other[v]).sum();
+            }
+            for (k, &v) in late_velocities.iter().enumerate() {
+                a[r * n + rows + k] = one[v];
+                a[(rows + k) * n + r] = one[v];
+            }
+        }
+        (rows..n).for_each(|k| a[k * n + k] = -1.0);
+        let full = scaled.iter().map(|row| row.iter().map(|x| x * x).sum()).collect();
+        RowProducts { n, whole: (0..rows).map(|r| a[r * n + r]).collect(), full, a, late }
     }
 
     /// Part of a row that is left; all of a row that is zero.
@@ -61,11 +94,36 @@ impl RowProducts {
         }
     }
 
-    fn eliminate(&mut self, r: usize) {
-        let (n, left) = (self.n, self.left(r));
-        if self.whole[r] <= 0.0 || left <= NOTHING {
-            return;
+    /// The part of an early row that the joints before it can follow.
+    fn followed(&self, r: usize) -> f64 {
+        match self.full[r] > 0.0 {
+            true => self.a[r * self.n + r] / self.full[r],
+            false => 0.0,
         }
+    }
+
+    fn eliminate(&mut self, r: usize) {
+        if self.whole[r] > 0.0 && self.left(r) > NOTHING {
+            self.take_off(r);
+        }
+    }
+
+    /// Eliminates the velocities of a node, those that have not been from the start.
+    fn eliminate_node(&mut self, i: usize) {
+        let rows = self.whole.len();
+        for k in (0..self.late.len()).filter(|&k| self.late[k] == i).map(|k| rows + k).collect::<Vec<_>>() {
+            let pivot = self.a[k * self.n + k];
+            for r in 0..rows {
+                let entry = self.a[k * self.n + r];
+                self.whole[r] -= entry * entry / pivot;
+            }
+            self.take_off(k);
+        }
+    }
+
+    /// Takes what the row or velocity `r` accounts for off all others.
+    fn take_off(&mut self, r: usize) {
+        let n = self.n;
         let row = self.a[r * n..(r + 1) * n].to_vec();
         for i in 0..n {
             let factor = row[i] / row[r];
@@ -88,9 +146,13 @@ pub trait RowLists {
     /// Parent of a node.
     fn parent(&self, node: usize) -> Option<usize>;
     /// Elimination of a node.
-    fn elimination(&mut self, node: usize) -> &mut Elimination;
+    fn elimination(&self, node: usize) -> &Elimination;
+    /// The same, to be changed.
+    fn elimination_mut(&mut self, node: usize) -> &mut Elimination;
     /// Unknowns that are solved at the ground.
-    fn ground(&mut self) -> &mut Vec<usize>;
+    fn ground(&self) -> &[usize];
+    /// The same, to be changed.
+    fn ground_mut(&mut self) -> &mut Vec<usize>;
     /// The row of an unknown.
     fn row(&self, unknown: usize) -> Option<usize>;
     /// Whether rows may wait for those of an inner node. Code of loops over links has the places of its columns.
@@ -133,10 +195,16 @@ impl<S> RowLists for Tree<S> {
     fn parent(&self, node: usize) -> Option<usize> {
         self.nodes[node].parent
     }
-    fn elimination(&mut self, node: usize) -> &mut Elimination {
+    fn elimination(&self, node: usize) -> &Elimination {
+        &self.nodes[node].elimination
+    }
+    fn elimination_mut(&mut self, node: usize) -> &mut Elimination {
         &mut self.nodes[node].elimination
     }
-    fn ground(&mut self) -> &mut Vec<usize> {
+    fn ground(&self) -> &[usize] {
+        &self.solve_at_ground
+    }
+    fn ground_mut(&mut self) -> &mut Vec<usize> {
         &mut self.solve_at_ground
     }
     fn row(&self, unknown: usize) -> Option<usize> {
@@ -152,50 +220,102 @@ pub fn row_of(unknown: Unknown) -> Option<usize> {
     }
 }
 
+/// Rows that are solved at a node before its own freedoms although these are freedoms of their loop: `(node, unknown)`. Their
+/// columns are open on a branch that starts at the ground, and that is eliminated before the node.
+pub fn early_rows(lists: &impl RowLists) -> Vec<(usize, usize)> {
+    let mut early = Vec::new();
+    for i in 0..lists.nodes() {
+        let rows = lists.elimination(i).solve_before.iter().copied().filter(|&g| lists.row(g).is_some());
+        let mut rows = rows.peekable();
+        if rows.peek().is_none() {
+            continue;
+        }
+        let beyond: Vec<bool> = (0..lists.nodes()).map(|j| ancestors(lists, j).contains(&i)).collect();
+        let elsewhere = |g: usize| (0..lists.nodes()).any(|j| !beyond[j] && lists.elimination(j).open.contains(&g));
+        early.extend(rows.filter(|&g| elsewhere(g)).map(|g| (i, g)));
+    }
+    early
+}
+
+/// Has all early rows wait for the ground.
+pub fn solve_late(lists: &mut impl RowLists) {
+    for (i, g) in early_rows(lists) {
+        list(lists.elimination_mut(i), false).retain(|&h| h != g);
+        wait(lists, i, g, true);
+    }
+}
+
+/// Nodes whose freedoms are eliminated after early rows of their loops.
+fn late_nodes(lists: &impl RowLists) -> BTreeSet<usize> {
+    let early = early_rows(lists);
+    early.iter().flat_map(|&(i, _)| ancestors(lists, i).into_iter().chain([i])).collect()
+}
+
 /// Orders the rows that are solved at the same node by the parts of them that are left at all of the positions, and
 /// moves rows that are nearly dependent to an inner node. A row is taken in the order that it has if its relative pivot is
 /// at least the part `large` of the largest one. Returns whether anything has changed.
 pub fn order_rows(lists: &mut impl RowLists, mut at: Vec<RowProducts>, large: f64) -> bool {
     let mut changed = false;
+    let early: Vec<usize> = early_rows(lists).into_iter().map(|(_, g)| g).collect();
     for i in (0..lists.nodes()).rev() {
         for after in [false, true] {
-            let old = list(lists, i, after).clone();
+            let old = list(lists.elimination_mut(i), after).clone();
             let inward = lists.may_wait() && inner(lists, i).is_some();
-            let (new, waiting) = ordered(lists, &old, &mut at, large, inward);
+            let waits = Waits { early: if after { &[] } else { &early }, inward };
+            let (new, waiting) = ordered(lists, &old, &mut at, large, waits);
             changed |= new != old;
-            *list(lists, i, after) = new;
+            *list(lists.elimination_mut(i), after) = new;
             for g in waiting {
-                wait(lists, i, g);
+                wait(lists, i, g, early.contains(&g));
+            }
+            if !after {
+                at.iter_mut().for_each(|products| products.eliminate_node(i));
             }
         }
     }
-    let old = lists.ground().clone();
-    let new = ordered(lists, &old, &mut at, large, false).0;
+    let old = lists.ground().to_vec();
+    let new = ordered(lists, &old, &mut at, large, Waits { early: &[], inward: false }).0;
     changed |= new != old;
-    *lists.ground() = new;
+    *lists.ground_mut() = new;
     changed
 }
 
 /// Whether the order loses digits at one position: a row that is nearly dependent on those before it is eliminated, and
-/// others come after it.
-fn loses_digits(lists: &mut impl RowLists, mut at: RowProducts) -> bool {
-    let mut order = Vec::new();
-    for i in (0..lists.nodes()).rev() {
-        let Elimination { solve_before, solve_after, .. } = lists.elimination(i);
-        order.extend(solve_before.iter().chain(solve_after.iter()).copied());
-    }
-    order.extend(lists.ground().iter().copied());
-    let rows: Vec<usize> = order.into_iter().filter_map(|g| lists.row(g)).collect();
-    rows.iter().enumerate().any(|(k, &r)| {
-        let small = (NOTHING..SMALL).contains(&at.left(r)) && k + 1 < rows.len();
+/// others come after it, or an early row can hardly be followed by the joints before it.
+fn loses_digits(lists: &impl RowLists, mut at: RowProducts) -> bool {
+    let early = early_rows(lists);
+    let mut rest = (0..lists.nodes()).map(|i| solved(lists, i).count()).sum::<usize>() + lists.ground().len();
+    let mut loses = |at: &mut RowProducts, g: usize, early: bool| {
+        rest -= 1;
+        let Some(r) = lists.row(g) else { return false };
+        let small = match early {
+            true => at.followed(r) < SMALL,
+            false => (NOTHING..SMALL).contains(&at.left(r)) && rest > 0,
+        };
         at.eliminate(r);
         small
-    })
+    };
+    for i in (0..lists.nodes()).rev() {
+        let Elimination { solve_before, solve_after, .. } = lists.elimination(i);
+        if solve_before.iter().any(|&g| loses(&mut at, g, early.contains(&(i, g)))) {
+            return true;
+        }
+        at.eliminate_node(i);
+        if solve_after.iter().any(|&g| loses(&mut at, g, false)) {
+            return true;
+        }
+    }
+    lists.ground().iter().any(|&g| loses(&mut at, g, false))
 }
 
-/// Unknowns that are solved at node `i`, before or after its own freedoms.
-fn list(lists: &mut impl RowLists, i: usize, after: bool) -> &mut Vec<usize> {
-    let elimination = lists.elimination(i);
+/// Unknowns that are solved at node `i`.
+fn solved(lists: &impl RowLists, i: usize) -> impl Iterator<Item = usize> + '_ {
+    let Elimination { solve_before, solve_after, .. } = lists.elimination(i);
+    solve_before.iter().chain(solve_after).copied()
+}
+
+/// Unknowns that are solved at a node, before or after its own freedoms.
+fn list(elimination: &mut Elimination, after: bool) -> &mut Vec<usize> {
     if after {
         &mut elimination.solve_after
     } else {
@@ -203,14 +323,23 @@ fn list(lists: &mut impl RowLists, i: usize, after: bool) -> &mut Vec<usize> {
     }
 }
 
-/// The unknowns of a list with its rows in a new order, and the rows that are to wait for inner ones, if `inner` rows
-/// exist. Eliminates the rows that stay. Unknowns that are no rows keep their places.
+/// Which rows may wait.
+#[derive(Clone, Copy)]
+struct Waits<'a> {
+    /// Early rows.
+    early: &'a [usize],
+    /// Whether rows exist further inboard for which others may wait.
+    inward: bool,
+}
+
+/// The unknowns of a list with its rows in a new order, and the rows that are to wait for inner ones. Eliminates the rows
+/// that stay. Unknowns that are no rows keep their places.
 fn ordered(
     lists: &impl RowLists,
     list: &[usize],
     at: &mut [RowProducts],
     large: f64,
-    inner: bool,
+    waits: Waits,
 ) -> (Vec<usize>, Vec<usize>) {
     let row = |g: usize| lists.row(g);
     let mut rest: Vec<usize> = list.iter().copied().filter(|&g| row(g).is_some()).collect();
@@ -220,7 +349,12 @@ fn ordered(
         let most = parts.iter().fold(0.0_f64, |most, part| part.max(most));
         let first = parts.iter().position(|part| *part >= large * most).unwrap_or(0);
         let g = rest.remove(first);
-        if inner && (NOTHING..SMALL).contains(&parts[first]) {
+        let followed = |r| at.iter().all(|products| products.followed(r) >= EARLY);
+        let waits = match waits.early.contains(&g) {
+            true => !row(g).is_some_and(followed),
+            false => waits.inward && (NOTHING..SMALL).contains(&parts[first]),
+        };
+        if waits {
             waiting.push(g);
             continue;
         }
@@ -241,26 +375,23 @@ fn ancestors(lists: &impl RowLists, i: usize) -> Vec<usize> {
 }
 
 /// The nearest ancestor of node `i` at which rows are solved, `Some(None)` for the ground.
-fn inner(lists: &mut impl RowLists, i: usize) -> Option<Option<usize>> {
-    for k in ancestors(lists, i) {
-        let Elimination { solve_before, solve_after, .. } = lists.elimination(k).clone();
-        if solve_before.iter().chain(&solve_after).any(|&g| lists.row(g).is_some()) {
-            return Some(Some(k));
-        }
-    }
-    let ground = lists.ground().clone();
-    ground.iter().any(|&g| lists.row(g).is_some()).then_some(None)
+fn inner(lists: &impl RowLists, i: usize) -> Option<Option<usize>> {
+    let rows = |g: usize| lists.row(g).is_some();
+    let nearest = ancestors(lists, i).into_iter().find(|&k| solved(lists, k).any(rows));
+    let ground = || lists.ground().iter().any(|&g| rows(g)).then_some(None);
+    nearest.map(Some).or_else(ground)
 }
 
-/// Has row `g`, which was to be solved at node `i`, wait for the rows that are solved next further inboard.
-fn wait(lists: &mut impl RowLists, i: usize, g: usize) {
-    let Some(target) = inner(lists, i) else { return };
-    lists.elimination(i).open.push(g);
+/// Has row `g`, which was to be solved at node `i`, wait for the rows that are solved next further inboard, or, if it is
+/// early, for the ground, where its loop ends.
+fn wait(lists: &mut impl RowLists, i: usize, g: usize, early: bool) {
+    let Some(target) = (if early { Some(None) } else { inner(lists, i) }) else { return };
+    lists.elimination_mut(i).open.push(g);
     for k in ancestors(lists, i).into_iter().take_while(|&k| Some(k) != target) {
-        lists.elimination(k).open.push(g);
+        lists.elimination_mut(k).open.push(g);
     }
     match target {
-        Some(k) => lists.elimination(k).solve_after.push(g),
-        None => lists.ground().push(g),
+        Some(k) => lists.elimination_mut(k).solve_after.push(g),
+        None => lists.ground_mut().push(g),
     }
 }

@@ -7,6 +7,7 @@
 
 use std::collections::BTreeMap;
 
+use mbd_runtime::tree::row_order::early_rows;
 use mbd_runtime::{Accelerated, Constrained, Energetic, System};
 use mbd_testing::random::Rng;
 
@@ -17,13 +18,14 @@ use crate::dense::{Dense, Matrix, Vector};
 fn rates_are_those_of_dense_matrices() {
     let mut velocity = Errors::new("qd", 1e-11);
     let mut rate = Errors::new("pd", 1e-11);
-    let (mut redundant, mut skipped, mut rank) = (0, 0_u64, BTreeMap::new());
+    let (mut redundant, mut early, mut skipped, mut rank) = (0, 0, 0_u64, BTreeMap::new());
     for seed in 0..SYSTEMS {
         let Some(mut c) = Case::new(seed) else {
             skipped += 1;
             continue;
         };
         redundant += usize::from(c.truth.dense.rank < c.truth.dense.phi.nrows());
+        early += usize::from(!early_rows(c.i.tree()).is_empty());
         *rank.entry(c.truth.dense.rank).or_insert(0) += 1;
         let (qd, pd) = c.rates(&c.p.clone());
         let exact = c.coordinate_rates(&c.truth.v);
@@ -35,8 +37,8 @@ fn rates_are_those_of_dense_matrices() {
         let scale = c.truth.open_rates.amax().max(turning.amax());
         rate.add(&c, &ours, &exact, scale);
     }
-    assert!(SYSTEMS - skipped >= 500 && redundant > 150, "{skipped} {redundant}");
-    println!("{skipped} skipped, {redundant} with redundant rows, rank: {rank:?}");
+    assert!(SYSTEMS - skipped >= 500 && redundant > 150 && early > 30, "{skipped} {redundant} {early}");
+    println!("{skipped} skipped, {redundant} with redundant rows, {early} with early rows, rank: {rank:?}");
     velocity.done();
     rate.done();
 }

@@ -8,6 +8,7 @@ mod dense;
 mod dense_reference;
 mod derivatives;
 mod penalty;
+mod platforms;
 mod reactions;
 mod row_order;
 mod row_order_motion;

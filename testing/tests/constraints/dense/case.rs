@@ -41,6 +41,7 @@ pub fn system(seed: u64) -> LoopSystem {
             };
             random_loops(seed, &LoopKnobs { planar: true, kinds, tree, ..LoopKnobs::plain() })
         }
+        2 => random_loops(seed, &LoopKnobs::platforms(seed)),
         _ => random_loops(seed, &LoopKnobs::everything(seed, [4, 6, 10][seed as usize / 5 % 3])),
     }
 }
