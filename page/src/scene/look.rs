@@ -44,7 +44,8 @@ impl Scene {
         rows.fold(0.0, |most: f64, (x, _)| most.max(x.abs()))
     }
 
-    /// Writes what the page shows of this instant to [`Scene::out`].
+    /// Writes what the page shows of this instant to [`Scene::out`], the forces of contacts and joints only where they are
+    /// asked for.
     pub fn look(&mut self, forces: bool) {
         let mut v = std::mem::take(&mut self.v);
         self.system.system_mut().velocities(&self.q, &self.p, &mut v);
@@ -55,7 +56,8 @@ impl Scene {
         let error = kinetic + potential + spring - self.budget - work;
         let residual = self.residual();
         let touching = if forces { self.contact_forces() } else { Vec::new() };
-        let poses = self.touch.as_mut().map_or(Vec::new(), |touch| touch.poses(&self.q, &self.v));
+        let touch = self.touch.as_mut().filter(|_| forces);
+        let poses = touch.map_or(Vec::new(), |touch| touch.poses(&self.q, &self.v));
         let arrows = self.touch.as_ref().map_or(Vec::new(), |touch| touch.arrows(&poses, &touching));
         let arrows: Vec<[f64; 6]> = arrows.iter().map(|([a, b, c], [d, e, f])| [*a, *b, *c, *d, *e, *f]).collect();
         let reactions = if forces { self.reactions(&poses, &touching) } else { Vec::new() };
