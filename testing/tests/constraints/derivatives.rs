@@ -54,7 +54,11 @@ fn difference(a: &Blocks, b: &Blocks) -> f64 {
 impl Case {
     /// A random mechanism with random eliminations; none if it has a freedom without inertia.
     fn new(seed: u64) -> Option<Case> {
-        let system = random_loops(seed, &LoopKnobs::everything(seed, [3, 4, 6, 8][seed as usize % 4]));
+        let knobs = match seed % 8 {
+            7 => LoopKnobs::platforms(seed),
+            k => LoopKnobs::everything(seed, [3, 4, 6, 8][k as usize % 4]),
+        };
+        let system = random_loops(seed, &knobs);
         let plan = random_plan(&system.model, seed);
         system.state.interpreter(&plan).check_rank(&system.state.q).ok()?;
         let mut rng = Rng::new(seed, 8);
