@@ -6,6 +6,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::spatial::{ArticulatedInertia, ElementaryTransform, Force, Mat3, Motion, RigidInertia, Vec3};
+use crate::tree::row_order::early_rows;
 use crate::tree::{Bond, Tree};
 use crate::Scalar;
 
@@ -160,6 +161,8 @@ pub struct Factor<S> {
     pub whole: Vec<S>,
     /// Whether rows are eliminated in passes.
     pub in_passes: bool,
+    /// For every unknown, whether it is an early row ([`early_rows`]).
+    pub early: Vec<bool>,
     /// For every row of a constraint, those that are open when it is eliminated and meet it: all others are
     /// independent.
     pub later: Vec<Vec<usize>>,
@@ -334,6 +337,7 @@ impl<S: Scalar> Workspace<S> {
                 unknown_cross: vec![o; g * g],
                 whole: vec![o; g],
                 in_passes: tree.constraints.iter().any(|c| !c.passes.is_empty()),
+                early: early(tree),
                 later: later(tree),
             },
             constraints: Constraints {
@@ -387,6 +391,13 @@ fn through<S>(tree: &Tree<S>, i: usize) -> Vec<(usize, usize)> {
         parts.into_iter().enumerate().filter(|(_, here)| *here).map(move |(part, _)| (index, part))
     });
     parts.collect()
+}
+
+/// For every unknown, whether it is an early row.
+fn early<S>(tree: &Tree<S>) -> Vec<bool> {
+    let mut early = vec![false; tree.unknowns.len()];
+    early_rows(tree).into_iter().for_each(|(_, g)| early[g] = true);
+    early
 }
 
 /// Shared coordinates and rows in the order in which they are eliminated, and for each those that are coupled to it

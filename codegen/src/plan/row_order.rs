@@ -9,7 +9,7 @@ use mbd_runtime::tree::{Elimination, Unknown, PASSES};
 use mbd_runtime::Interpreter;
 
 use super::early;
-use super::structure::{Plan, RowsThatAct};
+use super::structure::{Plan, PlanBond, RowsThatAct};
 
 /// A row is taken in the order of the description if its relative pivot is at least this part of the largest one.
 const LARGE: f64 = 0.1;
@@ -37,6 +37,12 @@ impl RowLists for Plan {
     }
     fn row(&self, unknown: usize) -> Option<usize> {
         row_of(self.unknowns[unknown])
+    }
+    fn binds(&self, unknown: usize, node: usize) -> bool {
+        self.constraints.iter().filter(|c| c.slots.contains(&unknown)).any(|c| match &c.bond {
+            PlanBond::Cut { paths, .. } => paths.iter().any(|path| path.contains(&node)),
+            PlanBond::Coupling { .. } => false,
+        })
     }
     fn may_wait(&self) -> bool {
         !self.nodes.iter().any(|node| node.rolled)

@@ -7,15 +7,15 @@
 //! would. The sweeps have no branches: the order belongs to the tree. It is chosen when a plan is made, and anew where
 //! rows become nearly dependent during a motion ([`crate::Constrained::reorder_rows`]).
 //!
-//! The legs of a platform, which start at the ground, bind it by rows that their own joints can follow. Such rows are *early*:
-//! they are solved at the platform before its own freedoms, as soon as the leg has been eliminated (see
-//! [`early_rows`]). What a leg cannot follow by itself waits for the ground.
+//! Legs bind a platform, or a trunk to the ground, by rows that their own joints can follow. Such rows are *early*: they are
+//! solved as soon as the leg has been eliminated, before the freedoms of the platform or trunk (see [`early_rows`]). What a
+//! leg cannot follow by itself waits for the ground.
 
 use alloc::collections::BTreeSet;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::{Elimination, Source, Tree, Unknown};
+use super::{Bond, Elimination, Source, Tree, Unknown};
 use crate::system::{Constrained, Real};
 use crate::Interpreter;
 
@@ -94,11 +94,11 @@ impl RowProducts {
         }
     }
 
-    /// The part of an early row that the joints before it can follow.
+    /// The part of an early row that the joints before it can follow; all of a row that is zero.
     fn followed(&self, r: usize) -> f64 {
         match self.full[r] > 0.0 {
             true => self.a[r * self.n + r] / self.full[r],
-            false => 0.0,
+            false => 1.0,
         }
     }
 
@@ -155,6 +155,8 @@ pub trait RowLists {
     fn ground_mut(&mut self) -> &mut Vec<usize>;
     /// The row of an unknown.
     fn row(&self, unknown: usize) -> Option<usize>;
+    /// Whether an unknown is a row of a loop that a node is part of.
+    fn binds(&self, unknown: usize, node: usize) -> bool;
     /// Whether rows may wait for those of an inner node. Code of loops over links has the places of its columns.
     fn may_wait(&self) -> bool {
         true
@@ -210,6 +212,12 @@ impl<S> RowLists for Tree<S> {
     fn row(&self, unknown: usize) -> Option<usize> {
         row_of(self.unknowns[unknown])
     }
+    fn binds(&self, unknown: usize, node: usize) -> bool {
+        self.constraints.iter().filter(|c| c.slots.contains(&unknown)).any(|c| match &c.bond {
+            Bond::Cut(cut) => cut.path_a.contains(&node) || cut.path_b.contains(&node),
+            Bond::Coupling { .. } => false,
+        })
+    }
 }
 
 /// The row that an unknown is the multiplier of.
@@ -220,19 +228,17 @@ pub fn row_of(unknown: Unknown) -> Option<usize> {
     }
 }
 
-/// Rows that are solved at a node before its own freedoms although these are freedoms of their loop: `(node, unknown)`. Their
-/// columns are open on a branch that starts at the ground, and that is eliminated before the node.
+/// Rows that are solved at a node before freedoms of their loop, those of the node itself or further inboard: `(node, unknown)`.
+/// The other freedoms of the loop have been eliminated then: those of a branch beyond the node, or of one that starts at the
+/// ground.
 pub fn early_rows(lists: &impl RowLists) -> Vec<(usize, usize)> {
     let mut early = Vec::new();
     for i in 0..lists.nodes() {
-        let rows = lists.elimination(i).solve_before.iter().copied().filter(|&g| lists.row(g).is_some());
-        let mut rows = rows.peekable();
-        if rows.peek().is_none() {
-            continue;
-        }
-        let beyond: Vec<bool> = (0..lists.nodes()).map(|j| ancestors(lists, j).contains(&i)).collect();
-        let elsewhere = |g: usize| (0..lists.nodes()).any(|j| !beyond[j] && lists.elimination(j).open.contains(&g));
-        early.extend(rows.filter(|&g| elsewhere(g)).map(|g| (i, g)));
+        let Elimination { solve_before, solve_after, .. } = lists.elimination(i);
+        let inner = || ancestors(lists, i).into_iter();
+        let before = solve_before.iter().filter(|&&g| inner().chain([i]).any(|k| lists.binds(g, k)));
+        let after = solve_after.iter().filter(|&&g| inner().any(|k| lists.binds(g, k)));
+        early.extend(before.chain(after).map(|&g| (i, g)));
     }
     early
 }
@@ -240,15 +246,21 @@ pub fn early_rows(lists: &impl RowLists) -> Vec<(usize, usize)> {
 /// Has all early rows wait for the ground.
 pub fn solve_late(lists: &mut impl RowLists) {
     for (i, g) in early_rows(lists) {
-        list(lists.elimination_mut(i), false).retain(|&h| h != g);
+        for after in [false, true] {
+            list(lists.elimination_mut(i), after).retain(|&h| h != g);
+        }
         wait(lists, i, g, true);
     }
 }
 
 /// Nodes whose freedoms are eliminated after early rows of their loops.
 fn late_nodes(lists: &impl RowLists) -> BTreeSet<usize> {
-    let early = early_rows(lists);
-    early.iter().flat_map(|&(i, _)| ancestors(lists, i).into_iter().chain([i])).collect()
+    let mut late = BTreeSet::new();
+    for (i, g) in early_rows(lists) {
+        let own = lists.elimination(i).solve_before.contains(&g).then_some(i);
+        late.extend(ancestors(lists, i).into_iter().chain(own).filter(|&k| lists.binds(g, k)));
+    }
+    late
 }
 
 /// Orders the rows that are solved at the same node by the parts of them that are left at all of the positions, and
@@ -261,14 +273,14 @@ pub fn order_rows(lists: &mut impl RowLists, mut at: Vec<RowProducts>, large: f6
         for after in [false, true] {
             let old = list(lists.elimination_mut(i), after).clone();
             let inward = lists.may_wait() && inner(lists, i).is_some();
-            let waits = Waits { early: if after { &[] } else { &early }, inward };
+            let waits = Waits { early: if lists.may_wait() { &early } else { &[] }, inward };
             let (new, waiting) = ordered(lists, &old, &mut at, large, waits);
             changed |= new != old;
             *list(lists.elimination_mut(i), after) = new;
             for g in waiting {
                 wait(lists, i, g, early.contains(&g));
             }
-            if !after {
+            if !after && rows_are_left(lists, i) {
                 at.iter_mut().for_each(|products| products.eliminate_node(i));
             }
         }
@@ -300,8 +312,10 @@ fn loses_digits(lists: &impl RowLists, mut at: RowProducts) -> bool {
         if solve_before.iter().any(|&g| loses(&mut at, g, early.contains(&(i, g)))) {
             return true;
         }
-        at.eliminate_node(i);
-        if solve_after.iter().any(|&g| loses(&mut at, g, false)) {
+        if rows_are_left(lists, i) {
+            at.eliminate_node(i);
+        }
+        if solve_after.iter().any(|&g| loses(&mut at, g, early.contains(&(i, g)))) {
             return true;
         }
     }
@@ -380,6 +394,13 @@ fn inner(lists: &impl RowLists, i: usize) -> Option<Option<usize>> {
     let nearest = ancestors(lists, i).into_iter().find(|&k| solved(lists, k).any(rows));
     let ground = || lists.ground().iter().any(|&g| rows(g)).then_some(None);
     nearest.map(Some).or_else(ground)
+}
+
+/// Whether rows are solved at node `i` after its freedoms, or further inboard. Where none are, nothing depends on its velocities any
+/// more.
+fn rows_are_left(lists: &impl RowLists, i: usize) -> bool {
+    let own = &lists.elimination(i).solve_after;
+    own.iter().any(|&g| lists.row(g).is_some()) || inner(lists, i).is_some()
 }
 
 /// Has row `g`, which was to be solved at node `i`, wait for the rows that are solved next further inboard, or, if it is
