@@ -27,9 +27,10 @@ pub struct Elimination {
     pub screws: Vec<usize>,
     /// Unknowns with members in the subtree of this node that are not solved below it.
     pub open: Vec<usize>,
-    /// Unknowns solved at this node before its own freedoms (its subtrees hold all members).
+    /// Unknowns solved at this node before its own freedoms: its subtrees hold all members, or all but the node and its
+    /// ancestors, with a branch from the ground that is eliminated before (early rows, see [`super::row_order`]).
     pub solve_before: Vec<usize>,
-    /// Unknowns solved at this node after its own freedom, which is a member.
+    /// Unknowns solved at this node after its own freedom, which is a member; of early rows, its ancestors are members too.
     pub solve_after: Vec<usize>,
 }
 
