@@ -10,7 +10,7 @@
 //! ([`mbd_runtime::tree::row_order::order_rows`]). Rows of a chain are eliminated early by Sathya and Carpentier (Constrained
 //! Articulated Body Dynamics Algorithms, IEEE Transactions on Robotics 41, 2025), too.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use mbd_runtime::tree::row_order::early_rows;
 use mbd_runtime::tree::{Elimination, Unknown};
@@ -44,24 +44,24 @@ pub(super) fn with_early_rows(plan: &Plan) -> Option<Plan> {
 /// are solved before its freedoms.
 fn rows_of_platforms(plan: &Plan) -> Vec<(usize, usize)> {
     let root = |i: usize| plan.ancestors(i).last().copied().unwrap_or(i);
-    let mut bound: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
-    for (a, b) in plan.constraints.iter().filter_map(|c| ends(plan, c)).map(|[a, b]| (root(a), root(b))) {
-        bound.entry(a).or_default().insert(b);
-        bound.entry(b).or_default().insert(a);
+    let mut bound = vec![BTreeSet::new(); plan.nodes.len()];
+    for [a, b] in plan.constraints.iter().filter_map(|c| ends(plan, c)).map(|ends| ends.map(root)) {
+        bound[a].insert(b);
+        bound[b].insert(a);
     }
-    let legs = |i: usize| bound.get(&i).map_or(0, BTreeSet::len);
     let mut early = Vec::new();
-    for leg in bound.keys().copied().filter(|&leg| legs(leg) == 1) {
+    for leg in (0..bound.len()).filter(|&leg| bound[leg].len() == 1) {
         let opens = |g: &usize| plan.nodes[leg].elimination.open.contains(g);
         let own: Vec<&PlanConstraint> = plan.constraints.iter().filter(|c| c.slots.iter().any(opens)).collect();
-        let platforms: BTreeSet<Option<usize>> = own
-            .iter()
-            .map(|c| ends(plan, c)?.into_iter().find(|&i| root(i) != leg))
-            .map(|platform| platform.filter(|&i| i < leg && legs(root(i)) > 1))
-            .collect();
+        let platform = |c: &&PlanConstraint| ends(plan, c)?.into_iter().find(|&i| root(i) != leg);
+        let platforms: Vec<Option<usize>> = own.iter().map(platform).collect();
         let shared = plan.nodes[leg].elimination.open.iter().any(|&g| matches!(plan.unknowns[g], Unknown::Velocity(_)));
-        if let (false, 1, Some(Some(platform))) = (shared, platforms.len(), platforms.first()) {
-            early.extend(own.iter().flat_map(|c| &c.slots).map(|&g| (*platform, g)));
+        let Some(Some(platform)) = platforms.first().copied().filter(|first| platforms.iter().all(|i| i == first))
+        else {
+            continue;
+        };
+        if !shared && platform < leg && bound[root(platform)].len() > 1 {
+            early.extend(own.iter().flat_map(|c| &c.slots).map(|&g| (platform, g)));
         }
     }
     early
@@ -95,22 +95,26 @@ fn rows_of_trunks(plan: &Plan) -> Vec<(usize, usize)> {
 /// Whether the early rows of a plan save operations: estimates of what rows cost at a platform or trunk whose freedoms are
 /// eliminated before them and after them, by the sizes of the matrices.
 pub(super) fn saves_operations(plan: &Plan) -> bool {
-    // By platforms, and by trunks.
-    let mut early: BTreeMap<(usize, bool), usize> = BTreeMap::new();
+    // At every node as a trunk, and as a platform.
+    let mut early = vec![[0; 2]; plan.nodes.len()];
     for (node, g) in early_rows(plan) {
-        let trunk = plan.nodes[node].parent.filter(|_| plan.nodes[node].elimination.solve_after.contains(&g));
-        *early.entry((trunk.unwrap_or(node), trunk.is_some())).or_default() += 1;
+        match plan.nodes[node].parent.filter(|_| plan.nodes[node].elimination.solve_after.contains(&g)) {
+            Some(trunk) => early[trunk][0] += 1,
+            None => early[node][1] += 1,
+        }
     }
     let (mut with, mut without) = (0, 0);
-    for (&(node, is_trunk), &early) in &early {
+    for (node, early) in early.into_iter().enumerate() {
         let freedoms: usize = plan.ancestors(node).iter().map(|&i| plan.nodes[i].kind.nv()).sum();
         let open = &plan.nodes[node].elimination.open;
         let later = open.iter().filter(|g| matches!(plan.unknowns[**g], Unknown::Row(_))).count();
         // Entries of the columns, products of each pair of rows for each freedom, and a factorization.
         let behind = |rows: usize| freedoms * (6 * rows + rows * rows) + rows.pow(3) / 3;
-        without += behind(early + later);
         // Each early row changes a matrix of 6 by 6, which at a platform is no longer that of a rigid body.
-        with += behind(later) + 48 * early + if is_trunk { 0 } else { 24 * early + 20 * freedoms };
+        for (early, of_row, of_freedom) in [(early[0], 48, 0), (early[1], 72, 20)].into_iter().filter(|e| e.0 > 0) {
+            without += behind(early + later);
+            with += behind(later) + of_row * early + of_freedom * freedoms;
+        }
     }
     with < without
 }

@@ -61,7 +61,8 @@ pub(super) fn order(plan: &mut Plan) {
                 return;
             }
         }
-        order_rows(plan, products(plan), LARGE);
+        let products = products(plan);
+        order_rows(plan, products, LARGE);
     }
 }
 

@@ -62,7 +62,7 @@ pub const FEWEST: usize = 3;
 
 /// Orders the rows anew, the largest relative pivot first, where the order that they have loses digits at a position.
 /// Returns whether anything has changed.
-pub fn reorder_rows(lists: &mut impl RowLists, at: &RowProducts) -> bool {
+pub fn reorder_rows(lists: &mut dyn RowLists, at: &RowProducts) -> bool {
     loses_digits(lists, at.clone()) && order_rows(lists, vec![at.clone()], 1.0)
 }
 
@@ -125,7 +125,7 @@ pub fn row_of(unknown: Unknown) -> Option<usize> {
 /// Rows that are solved at a node before freedoms of their loop, those of the node itself or further inboard: `(node, unknown)`.
 /// The other freedoms of the loop have been eliminated then: those of a branch beyond the node, or of one that starts at the
 /// ground.
-pub fn early_rows(lists: &impl RowLists) -> Vec<(usize, usize)> {
+pub fn early_rows(lists: &dyn RowLists) -> Vec<(usize, usize)> {
     let mut early = Vec::new();
     for i in 0..lists.nodes() {
         let Elimination { solve_before, solve_after, .. } = lists.elimination(i);
@@ -138,7 +138,7 @@ pub fn early_rows(lists: &impl RowLists) -> Vec<(usize, usize)> {
 }
 
 /// Has all early rows wait for the ground.
-pub fn solve_late(lists: &mut impl RowLists) {
+pub fn solve_late(lists: &mut dyn RowLists) {
     for (i, g) in early_rows(lists) {
         for after in [false, true] {
             list(lists.elimination_mut(i), after).retain(|&h| h != g);
@@ -148,7 +148,7 @@ pub fn solve_late(lists: &mut impl RowLists) {
 }
 
 /// Nodes whose freedoms are eliminated after early rows of their loops.
-fn late_nodes(lists: &impl RowLists) -> BTreeSet<usize> {
+fn late_nodes(lists: &dyn RowLists) -> BTreeSet<usize> {
     let mut late = BTreeSet::new();
     for (i, g) in early_rows(lists) {
         let own = lists.elimination(i).solve_before.contains(&g).then_some(i);
@@ -160,7 +160,7 @@ fn late_nodes(lists: &impl RowLists) -> BTreeSet<usize> {
 /// Orders the rows that are solved at the same node by the parts of them that are left at all of the positions, and
 /// moves rows that are nearly dependent to an inner node. A row is taken in the order that it has if its relative pivot is
 /// at least the part `large` of the largest one. Returns whether anything has changed.
-pub fn order_rows(lists: &mut impl RowLists, mut at: Vec<RowProducts>, large: f64) -> bool {
+pub fn order_rows(lists: &mut dyn RowLists, mut at: Vec<RowProducts>, large: f64) -> bool {
     let mut changed = false;
     let early: Vec<usize> = early_rows(lists).into_iter().map(|(_, g)| g).collect();
     for i in (0..lists.nodes()).rev() {
@@ -188,7 +188,7 @@ pub fn order_rows(lists: &mut impl RowLists, mut at: Vec<RowProducts>, large: f6
 
 /// Whether the order loses digits at one position: a row that is nearly dependent on those before it is eliminated, and
 /// others come after it, or an early row can hardly be followed by the joints before it.
-fn loses_digits(lists: &impl RowLists, mut at: RowProducts) -> bool {
+fn loses_digits(lists: &dyn RowLists, mut at: RowProducts) -> bool {
     let early = early_rows(lists);
     let mut rest = (0..lists.nodes()).map(|i| solved(lists, i).count()).sum::<usize>() + lists.ground().len();
     let mut loses = |at: &mut RowProducts, g: usize, early: bool| {
@@ -217,7 +217,7 @@ fn loses_digits(lists: &impl RowLists, mut at: RowProducts) -> bool {
 }
 
 /// Unknowns that are solved at node `i`.
-fn solved(lists: &impl RowLists, i: usize) -> impl Iterator<Item = usize> + '_ {
+fn solved<'a>(lists: &'a dyn RowLists, i: usize) -> impl Iterator<Item = usize> + 'a {
     let Elimination { solve_before, solve_after, .. } = lists.elimination(i);
     solve_before.iter().chain(solve_after).copied()
 }
@@ -243,7 +243,7 @@ struct Waits<'a> {
 /// The unknowns of a list with its rows in a new order, and the rows that are to wait for inner ones. Eliminates the rows
 /// that stay. Unknowns that are no rows keep their places.
 fn ordered(
-    lists: &impl RowLists,
+    lists: &dyn RowLists,
     list: &[usize],
     at: &mut [RowProducts],
     large: f64,
@@ -278,12 +278,12 @@ fn ordered(
 }
 
 /// The ancestors of node `i`, from its parent inward.
-fn ancestors(lists: &impl RowLists, i: usize) -> Vec<usize> {
+fn ancestors(lists: &dyn RowLists, i: usize) -> Vec<usize> {
     core::iter::successors(lists.parent(i), |&k| lists.parent(k)).collect()
 }
 
 /// The nearest ancestor of node `i` at which rows are solved, `Some(None)` for the ground.
-fn inner(lists: &impl RowLists, i: usize) -> Option<Option<usize>> {
+fn inner(lists: &dyn RowLists, i: usize) -> Option<Option<usize>> {
     let rows = |g: usize| lists.row(g).is_some();
     let nearest = ancestors(lists, i).into_iter().find(|&k| solved(lists, k).any(rows));
     let ground = || lists.ground().iter().any(|&g| rows(g)).then_some(None);
@@ -292,14 +292,14 @@ fn inner(lists: &impl RowLists, i: usize) -> Option<Option<usize>> {
 
 /// Whether rows are solved at node `i` after its freedoms, or further inboard. Where none are, nothing depends on its velocities any
 /// more.
-fn rows_are_left(lists: &impl RowLists, i: usize) -> bool {
+fn rows_are_left(lists: &dyn RowLists, i: usize) -> bool {
     let own = &lists.elimination(i).solve_after;
     own.iter().any(|&g| lists.row(g).is_some()) || inner(lists, i).is_some()
 }
 
 /// Has row `g`, which was to be solved at node `i`, wait for the rows that are solved next further inboard, or, if it is
 /// early, for the ground, where its loop ends.
-fn wait(lists: &mut impl RowLists, i: usize, g: usize, early: bool) {
+fn wait(lists: &mut dyn RowLists, i: usize, g: usize, early: bool) {
     let Some(target) = (if early { Some(None) } else { inner(lists, i) }) else { return };
     lists.elimination_mut(i).open.push(g);
     for k in ancestors(lists, i).into_iter().take_while(|&k| Some(k) != target) {
