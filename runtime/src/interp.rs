@@ -86,7 +86,9 @@ impl<S: Scalar> Interpreter<S> {
             let group = |q, v| LieJoint::new(kind, q, v);
             match node.source {
                 Source::State { q, v } => {
-                    groups.push(group(q, v));
+                    // Nodes stand in the order of the elimination.
+                    let at = groups.partition_point(|other: &LieJoint| other.q < q);
+                    groups.insert(at, group(q, v));
                     if let Some(at) = group(q, v).quaternion() {
                         neutral[at + 3] = S::one();
                     }
@@ -98,8 +100,6 @@ impl<S: Scalar> Interpreter<S> {
                 }
             }
         }
-        // Nodes stand in the order of the elimination.
-        groups.sort_by_key(|group| group.q);
         Interpreter {
             tau: vec![o; dims.nv],
             drive_q,

@@ -95,8 +95,8 @@ fn platforms_first(model: &Model) -> Vec<usize> {
             }
         }
     }
-    let mut order: Vec<usize> = (0..model.joints.len()).collect();
     // Bodies that are fixed to the ground carry others, and have no elements.
-    order.sort_by_key(|&k| roots[model.joints[k].child].map(|root| bound[root].len() < 2));
-    order
+    let class = |k: usize| roots[model.joints[k].child].map(|root| bound[root].len() < 2);
+    let of = |wanted: Option<bool>| (0..model.joints.len()).filter(move |&k| class(k) == wanted);
+    of(None).chain(of(Some(false))).chain(of(Some(true))).collect()
 }

@@ -51,8 +51,9 @@ pub fn choose(model: &Model, elements: &Elements, slots: &[Slot], mounts: &[Opti
         nodes.push(node(model, elements, slots, k, way, (c, s), h));
     }
     add_inertias(model, elements, &inside, &mut nodes);
-    let mut joint_nodes: Vec<usize> = (0..nodes.len()).filter(|&k| elements.list[k].last).collect();
-    joint_nodes.sort_by_key(|&k| elements.list[k].joint);
+    let mut last = vec![None; model.joints.len()];
+    (0..nodes.len()).filter(|&k| elements.list[k].last).for_each(|k| last[elements.list[k].joint.0] = Some(k));
+    let joint_nodes: Vec<usize> = last.into_iter().flatten().collect();
     let frames = named_frames(model, elements, &inside, &joint_nodes);
     let mounts = mounts.iter().map(|m| m.as_ref().map(|m| m.each_ref().map(|c| carried_frame("", c, &inside))));
     let mounts = mounts.collect();

@@ -42,23 +42,28 @@ impl RowProducts {
             dense
         };
         let scaled: Vec<Vec<f64>> = interpreter.rows().iter().map(dense).collect();
-        let (mut late, mut late_velocities) = (Vec::new(), Vec::new());
+        let (mut late, mut velocities) = (Vec::new(), Vec::new());
         for i in late_nodes(interpreter.tree()) {
             let node = &interpreter.tree().nodes[i];
             if let Source::State { v, .. } = node.source {
-                late_velocities.extend(v..v + node.kind.nv());
-                late.resize(late_velocities.len(), i);
+                velocities.extend(v..v + node.kind.nv());
+                late.resize(velocities.len(), i);
             }
         }
+        RowProducts::of(&scaled, &velocities, late)
+    }
+
+    /// Of rows by velocities, of which some are late, those of the nodes `late`.
+    fn of(scaled: &[Vec<f64>], velocities: &[usize], late: Vec<usize>) -> RowProducts {
         let rows = scaled.len();
         let n = rows + late.len();
         let mut a = vec![0.0; n * n];
         for (r, one) in scaled.iter().enumerate() {
             for (s, other) in scaled.iter().enumerate() {
-                let early = (0..nv).filter(|v| !late_velocities.contains(v));
+                let early = (0..one.len()).filter(|v| !velocities.contains(v));
                 a[r * n + s] = early.map(|v| one[v] * other[v]).sum();
             }
-            for (k, &v) in late_velocities.iter().enumerate() {
+            for (k, &v) in velocities.iter().enumerate() {
                 a[r * n + rows + k] = one[v];
                 a[(rows + k) * n + r] = one[v];
             }
