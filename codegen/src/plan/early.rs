@@ -44,11 +44,8 @@ pub(super) fn with_early_rows(plan: &Plan) -> Option<Plan> {
 /// are solved before its freedoms.
 fn rows_of_platforms(plan: &Plan) -> Vec<(usize, usize)> {
     let root = |i: usize| plan.ancestors(i).last().copied().unwrap_or(i);
-    let mut bound = vec![BTreeSet::new(); plan.nodes.len()];
-    for [a, b] in plan.constraints.iter().filter_map(|c| ends(plan, c)).map(|ends| ends.map(root)) {
-        bound[a].insert(b);
-        bound[b].insert(a);
-    }
+    let pairs = plan.constraints.iter().filter_map(|c| ends(plan, c)).map(|ends| ends.map(root));
+    let bound = partners(plan.nodes.len(), pairs);
     let mut early = Vec::new();
     for leg in (0..bound.len()).filter(|&leg| bound[leg].len() == 1) {
         let opens = |g: &usize| plan.nodes[leg].elimination.open.contains(g);
@@ -65,6 +62,16 @@ fn rows_of_platforms(plan: &Plan) -> Vec<(usize, usize)> {
         }
     }
     early
+}
+
+/// For each of `n` branches, those that pairs bind it to.
+pub(super) fn partners(n: usize, pairs: impl Iterator<Item = [usize; 2]>) -> Vec<BTreeSet<usize>> {
+    let mut bound = vec![BTreeSet::new(); n];
+    for [a, b] in pairs.filter(|[a, b]| a != b) {
+        bound[a].insert(b);
+        bound[b].insert(a);
+    }
+    bound
 }
 
 /// A chain of fewer nodes carries the rows at its end to the ground.

@@ -1,12 +1,11 @@
 //! Splits joints into elementary joints, and merges bodies that are connected by fixed joints.
 
-use std::collections::BTreeSet;
-
 use mbd_runtime::tree::Kind;
 
+use super::early::partners;
 use super::placement::{direction, placement, rotation};
 use super::structure::PoseStep;
-use crate::model::{ConstraintKind, Model, Value};
+use crate::model::{ConstraintKind, Model, Mount, Value};
 
 /// An elementary joint. Its *element frame* is the child body's frame, or for the first half of a joint of two halves
 /// that frame at zero coordinates of the second.
@@ -85,16 +84,12 @@ fn platforms_first(model: &Model) -> Vec<usize> {
         let inner = joint.parent.and_then(|body| roots[body]);
         roots[joint.child] = inner.or((joint.kind.nv() > 0).then_some(k));
     }
-    let mut bound = vec![BTreeSet::new(); model.joints.len()];
-    for constraint in &model.constraints {
-        let ConstraintKind::Loop { first, second, .. } = &constraint.kind else { continue };
-        if let [Some(a), Some(b)] = [first, second].map(|mount| mount.body.and_then(|body| roots[body])) {
-            if a != b {
-                bound[a].insert(b);
-                bound[b].insert(a);
-            }
-        }
-    }
+    let root = |mount: &Mount| roots[mount.body?];
+    let pairs = model.constraints.iter().filter_map(|constraint| match &constraint.kind {
+        ConstraintKind::Loop { first, second, .. } => Some([root(first)?, root(second)?]),
+        ConstraintKind::Coupling { .. } => None,
+    });
+    let bound = partners(model.joints.len(), pairs);
     // Bodies that are fixed to the ground carry others, and have no elements.
     let class = |k: usize| roots[model.joints[k].child].map(|root| bound[root].len() < 2);
     let of = |wanted: Option<bool>| (0..model.joints.len()).filter(move |&k| class(k) == wanted);

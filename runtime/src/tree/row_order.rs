@@ -190,10 +190,11 @@ pub fn order_rows(lists: &mut dyn RowLists, mut at: Vec<RowProducts>, large: f64
 /// others come after it, or an early row can hardly be followed by the joints before it.
 fn loses_digits(lists: &dyn RowLists, mut at: RowProducts) -> bool {
     let early = early_rows(lists);
-    let mut rest = (0..lists.nodes()).map(|i| solved(lists, i).count()).sum::<usize>() + lists.ground().len();
+    let all = (0..lists.nodes()).flat_map(|i| solved(lists, i)).chain(lists.ground().iter().copied());
+    let mut rest = all.filter(|&g| lists.row(g).is_some()).count();
     let mut loses = |at: &mut RowProducts, g: usize, early: bool| {
-        rest -= 1;
         let Some(r) = lists.row(g) else { return false };
+        rest -= 1;
         let small = match early {
             true => at.followed(r) < SMALL,
             false => (NOTHING..SMALL).contains(&at.left(r)) && rest > 0,
