@@ -140,9 +140,14 @@ impl Programs {
         for output in options.outputs.iter().filter(|o| gaps(o)) {
             programs.outputs.push(compile(full, *output, options)?);
         }
+        // Early rows can cost less where another elimination of the freedoms costs less than without contacts.
+        let early = options.arithmetic == Arithmetic::Fast && full.model.constraints.is_empty();
+        let plain = early.then(|| Plan::new(&full.model, full.snap).with_contacts());
         #[cfg(feature = "factored")]
         for output in options.outputs.iter().filter(|o| in_pieces(o)) {
-            let program = factored(full, *output, options);
+            let programs_of = [Some(full), plain.as_ref()].into_iter().flatten();
+            let candidates = programs_of.filter_map(|full| factored(full, *output, options));
+            let program = candidates.min_by_key(|of| of.program.in_flight() + of.program.sticking());
             let program = program.ok_or_else(|| GenerateError::ModesNotFactored { model: full.model.name.clone() })?;
             for piece in program.program.pieces() {
                 finite(full, *output, &Code::Straight(piece.program.clone()), options.precision)?;
@@ -150,10 +155,30 @@ impl Programs {
             programs.factored.push(program);
         }
         let (contacts, rows) = (full.contacts::<f64>(), full.dims.rows);
+        let with_early = |full: &Plan, acts: &[bool]| {
+            let plan = full.acting(acts);
+            match options.arithmetic {
+                // Functions have the bits of those for all modes, whose rows are not early.
+                Arithmetic::Exact => plan,
+                Arithmetic::Fast => plan.with_early_contacts(&plan.early_contacts()),
+            }
+        };
         for modes in sets {
-            let plan = full.acting(&rows_that_act(rows, &contacts, &modes));
+            let acts = rows_that_act(rows, &contacts, &modes);
+            let plan = with_early(full, &acts);
+            let other = plain.as_ref().filter(|_| plan.early_tolerance.is_some()).map(|plain| with_early(plain, &acts));
+            let other = other.filter(|other| other.early_tolerance.is_some());
             let wanted = OF_EACH_SET.into_iter().filter(|output| options.outputs.contains(output));
-            let outputs = wanted.map(|output| compile(&plan, output, options)).collect::<Result<_, _>>()?;
+            let cheaper = |output| {
+                let first = compile(&plan, output, options)?;
+                let second = other.as_ref().map(|other| compile(other, output, options)).transpose()?;
+                let total = |of: &OutputProgram<Code>| of.program.counts().total();
+                Ok(match second {
+                    Some(second) if total(&second) < total(&first) => second,
+                    _ => first,
+                })
+            };
+            let outputs = wanted.map(cheaper).collect::<Result<_, _>>()?;
             programs.sets.push(SetPrograms { modes, plan, outputs });
         }
         Ok(programs)

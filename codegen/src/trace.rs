@@ -6,7 +6,8 @@ mod inputs;
 
 use mbd_runtime::spatial::Motion;
 use mbd_runtime::sweep::{FrameState, Sweeps};
-use mbd_runtime::tree::Tree;
+use mbd_runtime::tree::row_order::early_rows;
+use mbd_runtime::tree::{Bond, Closure, Tree};
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::Scalar;
 
@@ -67,6 +68,34 @@ pub(crate) fn rewrite(options: &Options) -> Rewrite {
     }
 }
 
+/// The tree of a plan for one output, not regrouped.
+pub(crate) fn symbolic_tree<'g>(
+    plan: &Plan,
+    output: Output,
+    given: &SymbolicInputs<'g>,
+    options: &Options,
+) -> Tree<Expr<'g>> {
+    let mut tree = plan.tree(&given.params);
+    tree.tolerance = Expr::Const(tolerance(options.precision));
+    // Rates do not tell multipliers. Early rows are independent, so that their axes do not decide which are left out.
+    if output == Output::Rates && plan.early_tolerance.is_some() {
+        let early: Vec<usize> = early_rows(&tree).into_iter().map(|(_, g)| g).collect();
+        for constraint in &mut tree.constraints {
+            let Bond::Cut(cut) = &mut constraint.bond else { continue };
+            let Closure::RollingBall { radius } = cut.closure else { continue };
+            if !constraint.slots.iter().all(|g| early.contains(g)) {
+                continue;
+            }
+            match radius {
+                // A point that has no slip is held by a ball joint.
+                Expr::Const(0.0) => cut.closure = Closure::Spherical,
+                _ => constraint.own_axes = true,
+            }
+        }
+    }
+    tree
+}
+
 /// Runs the sweeps of one output on symbols.
 ///
 /// # Errors
@@ -74,17 +103,19 @@ pub(crate) fn rewrite(options: &Options) -> Rewrite {
 pub fn trace(plan: &Plan, output: Output, options: &Options) -> Result<OutputProgram<Program>, GenerateError> {
     check_availability(plan, output)?;
     let frames = chosen_frames(plan, options)?;
-    let (graph, spec, sizes) = (Graph::default(), output.spec(), sizes(plan, options, frames.len()));
+    let spec = if plan.early_tolerance.is_some() { output.with_early_rows() } else { output.spec() };
+    let (graph, sizes) = (Graph::default(), sizes(plan, options, frames.len()));
     let given = SymbolicInputs::new(&graph, plan, spec, options);
-    let mut physical: Tree<Expr> = plan.tree(&given.params);
-    physical.tolerance = Expr::Const(tolerance(options.precision));
+    let mut physical = symbolic_tree(plan, output, &given, options);
     if !given.acts.is_empty() {
         physical = physical.with_row_factors(given.acts.clone());
     }
     let tree = physical.regrouped();
     let run = Run { graph: &graph, plan, tree: &tree, physical: &physical, given: &given, frames: &frames };
     let mut results: Vec<Vec<Expr>> = spec.results.iter().map(|a| vec![Expr::zero(); a.len(&sizes)]).collect();
-    run.sweep(output, &mut results);
+    let (own, further) = results.split_at_mut(output.spec().results.len());
+    let early_rows_act = run.sweep(output, own);
+    further.iter_mut().for_each(|flag| flag[0] = early_rows_act);
     name_results(&graph, spec, &sizes, &results);
     let program = passes::run(Program::new(&graph, &results.concat()), rewrite(options));
     Ok(OutputProgram { spec, inputs: given.arrays, program })
@@ -121,8 +152,8 @@ struct Run<'a, 'g> {
 }
 
 impl<'g> Run<'_, 'g> {
-    /// Calls the sweep of an output, which writes the arrays of [`Spec::results`].
-    fn sweep(&self, output: Output, results: &mut [Vec<Expr<'g>>]) {
+    /// Calls the sweep of an output, which writes the arrays of [`Spec::results`]. Gives [`Sweeps::early_rows_act`].
+    fn sweep(&self, output: Output, results: &mut [Vec<Expr<'g>>]) -> Expr<'g> {
         let (tree, trace, given) = (self.tree, self.graph, self.given);
         let (q, second, third, u) = (&given.q, &given.second, &given.third, &given.inputs());
         let sweeps = Sweeps { tree, trace };
@@ -173,9 +204,14 @@ impl<'g> Run<'_, 'g> {
             (Output::ProjectMomenta, [v, freed, sigma]) => sweeps.project_momenta(q, second, u, w, v, freed, sigma),
             (Output::PositionCorrection, [phi, dq, pivots]) => sweeps.position_correction(q, u, w, phi, dq, pivots),
             (Output::Gaps, [gaps, velocities, entries]) => sweeps.gaps(q, second, u, w, [gaps, velocities, entries]),
-            (Output::Multipliers, [lambda]) => other.multipliers(q, second, u, w, v, lambda),
+            (Output::Multipliers, [lambda]) => {
+                *w = Workspace::new(other.tree);
+                other.multipliers(q, second, u, w, v, lambda);
+                return other.early_rows_act(&w.factor);
+            }
             _ => unreachable!("results are those of the table"),
         }
+        sweeps.early_rows_act(&w.factor)
     }
 
     /// The chosen frames.

@@ -373,6 +373,8 @@ pub struct Cut<S> {
     pub path_a: Vec<usize>,
     /// The same for the second frame.
     pub path_b: Vec<usize>,
+    /// Whether it binds a node to the ground.
+    pub grounded: bool,
 }
 
 /// The two frames or the joints that a constraint connects.
@@ -416,6 +418,9 @@ pub struct Constraint<S> {
     /// Compliance `μ` of the rows in `Φ v = b + μ σ`: the penalty method with the weight `1/μ`, in place of exact
     /// constraints.
     pub compliance: Option<S>,
+    /// Whether its rows, the three of a ball that rolls on a plane and has no slip, are taken along the axes of the second
+    /// frame. They bind the same, with fewer operations, but multipliers are along these axes, too.
+    pub own_axes: bool,
 }
 
 /// A mechanism. `S` is the scalar of its constants and of everything computed from them.
@@ -437,6 +442,9 @@ pub struct Tree<S> {
     pub constraints: Vec<Constraint<S>>,
     /// Fraction of a row's diagonal entry of `Φ M⁻¹Φᵀ`; a row of which less remains counts as redundant.
     pub tolerance: S,
+    /// The same of early rows ([`row_order::early_rows`]) and the sum of the diagonals of their constraint, where another
+    /// elimination serves when one of them is left out; without it they are left out next to rounding errors only.
+    pub early_tolerance: Option<f64>,
     /// One factor for each row of the constraints, where rows act or not by numbers: 1 for a row that acts, 0 for one
     /// that does not. All act where there are none. Rows that do not act have no multipliers, and no pivots; a
     /// constraint whose first row does not act has no residuals and entries either.

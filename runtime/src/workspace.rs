@@ -192,6 +192,10 @@ pub struct Constraints<S> {
     pub through: Vec<Vec<(usize, usize)>>,
     /// Wrenches at each constraint's frames, carried inward along the paths.
     pub end_wrenches: Vec<[Force<S>; 2]>,
+    /// Whether loops through the ground act through each node.
+    pub grounded: Vec<bool>,
+    /// The sums of their wrenches at each node, carried inward.
+    pub to_ground: Vec<Force<S>>,
     /// Constraints all of whose rows are left out: only gaps are asked for without some.
     pub left_out: Vec<bool>,
     /// Rows that are left out.
@@ -342,6 +346,8 @@ impl<S: Scalar> Workspace<S> {
             },
             constraints: Constraints {
                 through: (0..n).map(|i| through(tree, i)).collect(),
+                grounded: (0..n).map(|i| grounded(tree, i)).collect(),
+                to_ground: vec![Force::zero(); n],
                 end_wrenches: vec![[Force::zero(); 2]; tree.constraints.len()],
                 reach: vec![[([[o; 3]; 3], [o; 3]); 2]; tree.constraints.len()],
                 left_out: vec![false; tree.constraints.len()],
@@ -391,6 +397,14 @@ fn through<S>(tree: &Tree<S>, i: usize) -> Vec<(usize, usize)> {
         parts.into_iter().enumerate().filter(|(_, here)| *here).map(move |(part, _)| (index, part))
     });
     parts.collect()
+}
+
+/// Whether loops through the ground act through a node.
+fn grounded<S>(tree: &Tree<S>, i: usize) -> bool {
+    tree.constraints.iter().any(|constraint| match &constraint.bond {
+        Bond::Cut(cut) => cut.grounded && [&cut.path_a, &cut.path_b].iter().any(|path| path.contains(&i)),
+        Bond::Coupling { .. } => false,
+    })
 }
 
 /// For every unknown, whether it is an early row.

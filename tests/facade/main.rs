@@ -7,6 +7,7 @@ mod committed;
 mod contacts;
 mod counts;
 mod derivatives;
+mod early_contacts;
 mod macro_errors;
 pub mod macro_model;
 mod mechanisms;

@@ -38,7 +38,8 @@ impl<'a> FactoredWriter<'a> {
         let _ = writeln!(out, "        let mut sequence = 0;");
         self.call(out, "        ", &program.always, "always", "");
         for (g, group) in program.groups.iter().enumerate() {
-            let _ = writeln!(out, "        let limb{g} = {};", self.mode(group));
+            let mutable = if group.modes.iter().any(|mode| mode.late.is_some()) { "mut " } else { "" };
+            let _ = writeln!(out, "        let {mutable}limb{g} = {};", self.mode(group));
         }
         if !program.touching.is_empty() {
             let any: Vec<String> = (0..program.groups.len()).map(|g| format!("limb{g} > 0")).collect();
@@ -46,6 +47,7 @@ impl<'a> FactoredWriter<'a> {
             self.call(out, "            ", &program.touching, "touching", "");
             let _ = writeln!(out, "        }}");
         }
+        self.early(out);
         self.limbs(out, false);
         let _ = writeln!(out, "        match sequence {{");
         for (k, trunk) in program.trunks.iter().enumerate() {
@@ -111,6 +113,19 @@ impl<'a> FactoredWriter<'a> {
         all.map(|(k, _)| k.to_string()).collect::<Vec<_>>().join(" | ")
     }
 
+    /// Inward calls of the limbs that may follow the rows of their contacts, each with its other mode where it cannot.
+    fn early(&self, out: &mut String) {
+        for (g, group) in self.program.groups.iter().enumerate() {
+            for (m, mode) in group.modes.iter().enumerate() {
+                let Some(late) = mode.late else { continue };
+                let _ = writeln!(out, "        if limb{g} == {m} {{");
+                self.call(out, "            ", &mode.inward, &format!("limb{g}_{m}"), "");
+                let flag = self.program.early_rows_act + g;
+                let _ = writeln!(out, "            if kept[{flag}] == 0.0 {{ limb{g} = {late}; }}\n        }}");
+            }
+        }
+    }
+
     /// Calls of the limbs in their modes: in the order of their places, each with its part.
     fn limbs(&self, out: &mut String, late: bool) {
         let _ = writeln!(out, "        let mut free = parts.iter_mut();");
@@ -128,7 +143,9 @@ impl<'a> FactoredWriter<'a> {
                 if !late {
                     let _ = writeln!(out, "                sequence = sequence * {} + {};", classes[g], mode.class);
                 }
-                if mode.reaches {
+                if !late && mode.late.is_some() {
+                    // It has been called already.
+                } else if mode.reaches {
                     let _ = writeln!(out, "                if let Some(part) = free.next() {{");
                     let used = if piece.is_empty() { "                    let _ = part;\n" } else { "" };
                     let _ = write!(out, "{used}");

@@ -63,8 +63,15 @@ impl<'a> Contacts<'a> {
             "    pub fn {} {{\n        match self.set {{",
             signature.declaration(&self.options.runtime, entry)
         );
-        for k in 0..self.sets.len() {
-            let _ = writeln!(out, "            {k} => self.{}({arguments}),", Self::for_set(name, k));
+        for (k, set) in self.sets.iter().enumerate() {
+            let call = format!("self.{}({arguments})", Self::for_set(name, k));
+            let _ = match set.plan.early_tolerance {
+                None => writeln!(out, "            {k} => {call},"),
+                // A leg cannot follow the rows of its foot: the function for all modes serves.
+                Some(_) => {
+                    writeln!(out, "            {k} => if {call} == [0.0] {{ self.{name}_masked({arguments}) }},")
+                }
+            };
         }
         let _ = writeln!(out, "            _ => self.{name}_masked({arguments}),\n        }}\n    }}");
     }

@@ -121,7 +121,11 @@ impl Signature {
         let mut arguments = ports(spec.inputs, Place::Read);
         let (mut structure, mut returned) = (None, None);
         match spec.structure {
-            _ if spec.returned => returned = ports(spec.results, Place::Returned).pop(),
+            _ if spec.returned => {
+                let (last, others) = spec.results.split_last().map_or((None, &[][..]), |(x, rest)| (Some(x), rest));
+                arguments.extend(ports(others, Place::Written));
+                returned = last.map(|array| Port::new(array, sizes, Place::Returned));
+            }
             None => arguments.extend(ports(spec.results, Place::Written)),
             Some(name) => {
                 let lengths = |shape: &[Dim]| shape.iter().map(|dim| sizes.of(*dim)).collect();

@@ -2,23 +2,18 @@
 
 use std::rc::Rc;
 
-use mbd_runtime::contact::rows_that_act;
-
 use super::symbols::{Crossing, Symbol};
 use super::tracing::{Handed, Kind, Traced, Tracing};
 use crate::output::Output;
 use crate::rolled::{output, read, OutputSweeps, PassState, SweepDirection};
 use crate::symbolic::{Expr, ProgramResult};
-use crate::trace::{tolerance, SymbolicInputs};
+use crate::trace::{symbolic_tree, SymbolicInputs};
 
 impl<'g> Tracing<'g, '_> {
     /// Runs the sweeps in a set of modes, with or without cuts.
     pub fn trace(&mut self, set: &[usize], cuts: bool) -> Option<Traced<'g>> {
-        let modes = self.modes(set);
-        let plan = self.full.acting(&rows_that_act(self.full.dims.rows, &self.contacts, &modes));
-        let mut physical = plan.tree(&self.given.params);
-        physical.tolerance = Expr::Const(tolerance(self.options.precision));
-        let tree = physical.regrouped();
+        let plan = self.plan(set);
+        let tree = symbolic_tree(&plan, self.output, &self.given, self.options).regrouped();
         let tree = match self.output {
             Output::Multipliers => tree.for_accelerations().clone(),
             _ => tree,
@@ -74,6 +69,7 @@ impl<'g> Tracing<'g, '_> {
             state.end(k, &given);
         }
         traced.results = state.finish(&given);
+        traced.early_rows_act = plan.early_tolerance.map(|_| state.early_rows_act());
         Some(traced)
     }
 
@@ -81,7 +77,7 @@ impl<'g> Tracing<'g, '_> {
     fn cut_running(&mut self, set: &[usize], pass: usize, state: &mut PassState<'g, '_>, given: &SymbolicInputs<'g>) {
         let slots: Vec<usize> = (0..state.tree.unknowns.len()).filter(|g| state.tree.is_slot(*g)).collect();
         // Rows that limbs have eliminated do not cross: they would only shift the numbers of those that do.
-        let crosses: Vec<bool> = slots.iter().map(|unknown| self.crosses(*unknown)).collect();
+        let crosses: Vec<bool> = slots.iter().map(|unknown| self.crosses(set, *unknown)).collect();
         let n = slots.len();
         let mut number = 0;
         state.running(pass, given, |e| {
@@ -98,8 +94,10 @@ impl<'g> Tracing<'g, '_> {
     }
 
     /// Whether an unknown is solved in the trunk, as far as it belongs to a contact.
-    fn crosses(&self, unknown: usize) -> bool {
-        self.contact_of(unknown).is_none_or(|contact| self.reaching[contact])
+    fn crosses(&self, set: &[usize], unknown: usize) -> bool {
+        let Some(contact) = self.contact_of(unknown) else { return true };
+        let early = || self.limb_of(unknown).is_some_and(|g| self.limbs[g].late[set[g]].is_some());
+        self.reaching[contact] && !early()
     }
 
     /// Notes whether a value that crosses in flight is another one here. Whether it crosses as a symbol in all modes.
@@ -116,7 +114,12 @@ impl<'g> Tracing<'g, '_> {
 
     /// Replaces what a limb hands to the trunk where that depends on the modes of the limb.
     fn cut_limb(&mut self, set: &[usize], crossing: Crossing, solved: bool, e: &mut Expr<'g>, traced: &mut Traced<'g>) {
-        if self.crosses_always(set, crossing, e) {
+        let always = self.crosses_always(set, crossing, e);
+        // Sweeps that flight does not need hand on nothing there.
+        if solved && matches!(*e, Expr::Node { .. }) && !self.in_flight.contains_key(&crossing) {
+            self.found.insert(crossing);
+        }
+        if always {
             traced.from_limbs[usize::from(solved)].insert(crossing, *e);
             *e = self.symbol_for(if solved { Symbol::BackFromLimb(crossing) } else { Symbol::FromLimb(crossing) });
         } else if !solved {

@@ -125,6 +125,7 @@ impl Layout {
             Wanted::Symbol(Symbol::Handed { entry, .. }) => Goal::Own(*self.handed.get(&entry)?),
             Wanted::Symbol(Symbol::Returned { entry, .. }) => Goal::Own(self.returned_at(*self.returned.get(&entry)?)),
             Wanted::Symbol(symbol) => Goal::Kept(*self.crossing.get(&symbol)?),
+            Wanted::EarlyRowsAct(g) => Goal::Kept(self.count + g),
             Wanted::Multiplier { place, entry } => Goal::Part { place, entry: self.multiplier_at(entry) },
         })
     }
@@ -226,7 +227,8 @@ impl Cutting<'_, '_> {
         let mut limb = |g: usize, m: usize, modes: &Vec<Mode>| {
             let reaches = !self.tracing.reaching_contacts(g, m).is_empty();
             let (modes, class) = (modes.clone(), self.classes[g][m]);
-            LimbMode { modes, reaches, class, inward: next(), outward: next() }
+            let late = self.tracing.limbs[g].late[m];
+            LimbMode { modes, reaches, late, class, inward: next(), outward: next() }
         };
         let groups = self.tracing.limbs.iter().enumerate().map(|(g, group)| Group {
             contacts: group.contacts.clone(),
@@ -237,7 +239,8 @@ impl Cutting<'_, '_> {
         let program = FactoredProgram {
             results: self.writers.len(),
             acts: self.tracing.given.first_of("acts"),
-            kept: layout.count,
+            kept: layout.count + self.tracing.limbs.len(),
+            early_rows_act: layout.count,
             part: layout.part(),
             always,
             touching,

@@ -15,6 +15,23 @@ pub const MOST_LIMB_MODES: usize = 512;
 pub struct Limb {
     pub contacts: Vec<usize>,
     pub modes: Vec<Vec<Mode>>,
+    /// For modes in which rows are eliminated in the limb as far as it can follow them: the mode of the same contacts in which
+    /// all come to the trunk.
+    pub late: Vec<Option<usize>>,
+}
+
+impl Limb {
+    /// Gives modes in which `early` says so rows that are eliminated in the limb, and adds the modes in which these come to
+    /// the trunk.
+    pub fn take_early(&mut self, early: impl Fn(&[Mode]) -> bool) {
+        for m in 0..self.modes.len() {
+            if early(&self.modes[m]) {
+                self.late[m] = Some(self.modes.len());
+                self.modes.push(self.modes[m].clone());
+                self.late.push(None);
+            }
+        }
+    }
 }
 
 /// The nodes that constraint `index` of a plan binds.
@@ -27,10 +44,14 @@ fn members(plan: &Plan, index: usize) -> Vec<usize> {
 
 /// Whether rows of a constraint are eliminated in the trunk or at the ground.
 pub fn reaches(plan: &Plan, index: usize, trunk: &[bool]) -> bool {
+    reaches_of(plan, &plan.constraints[index].slots, trunk)
+}
+
+/// Whether some of these rows are.
+pub fn reaches_of(plan: &Plan, slots: &[usize], trunk: &[bool]) -> bool {
     let inboard = plan.nodes.iter().zip(trunk).filter(|(_, trunk)| **trunk);
     let solved =
         inboard.flat_map(|(node, _)| node.elimination.solve_before.iter().chain(&node.elimination.solve_after));
-    let slots = &plan.constraints[index].slots;
     solved.chain(&plan.solve_at_ground).any(|unknown| slots.contains(unknown))
 }
 
@@ -86,7 +107,7 @@ pub fn limbs(full: &Plan, plan: &Plan, trunk: &[bool]) -> Option<(Vec<Limb>, Vec
                 return None;
             }
         }
-        Some((Limb { contacts, modes }, branches))
+        Some((Limb { contacts, late: vec![None; modes.len()], modes }, branches))
     };
     let limbs = groups.into_iter().map(limb).collect::<Option<Vec<_>>>()?;
     Some(limbs.into_iter().unzip())

@@ -7,6 +7,12 @@
 //! does not ask which limbs these are: it reads what they hand to it in the order in which they come. So the trunk of
 //! a quadruped on its left feet is that of a quadruped on its right ones.
 //!
+//! In fast arithmetic, the rows of a limb that its joints can follow are eliminated in the limb ([`Plan::early_contacts`]), and
+//! the trunk takes no more of it than in flight. A limb then has one more mode for the same modes of its contacts, with
+//! rows that come to the trunk: it runs where the limb finds that it cannot follow its rows, as where it is straight.
+//!
+//! [`Plan::early_contacts`]: crate::plan::Plan::early_contacts
+//!
 //! The pieces are cut out of the symbolic runs of the sweeps that functions for single sets of modes are made from
 //! (`cuts.rs` says where), so the operations and the bits are theirs.
 
@@ -26,7 +32,7 @@ mod tracing;
 use std::collections::BTreeSet;
 
 use mbd_runtime::contact::Mode;
-use mbd_runtime::Scalar;
+use mbd_runtime::{Real, Scalar};
 
 use crate::symbolic::{Counts, Program};
 
@@ -94,6 +100,9 @@ pub struct LimbMode {
     pub modes: Vec<Mode>,
     /// Whether rows of its contacts come to the trunk, so that it has a part.
     pub reaches: bool,
+    /// Where rows of contacts are eliminated in the limb as far as it can follow them: the number of the mode with the same modes
+    /// of the contacts that runs where it cannot.
+    pub late: Option<usize>,
     /// Number of the class of modes of this limb that are the same to the trunk.
     pub class: usize,
     /// Before the trunk.
@@ -114,7 +123,7 @@ impl LimbMode {
 pub struct Group {
     /// Its contacts, in ascending order.
     pub contacts: Vec<usize>,
-    /// Its modes; the first is the one in which all are open.
+    /// Its modes; the first is the one in which all are open. Those that run in place of others come last.
     pub modes: Vec<LimbMode>,
 }
 
@@ -145,6 +154,8 @@ pub struct FactoredProgram {
     pub acts: usize,
     /// Numbers kept between pieces.
     pub kept: usize,
+    /// The first of those that say for each limb whether all of its early rows act: 0 where one does not.
+    pub early_rows_act: usize,
     /// Numbers of the part of a group that touches.
     pub part: usize,
     /// What is computed in all modes, before everything else.
@@ -236,7 +247,8 @@ impl FactoredProgram {
 
     /// The same where every contact sticks, or is closed if it has no friction.
     pub fn sticking(&self) -> usize {
-        let last = self.groups.iter().map(|group| group.modes.len() - 1).collect();
+        let late = |group: &Group| group.modes.iter().filter(|mode| mode.late.is_some()).count();
+        let last = self.groups.iter().map(|group| group.modes.len() - late(group) - 1).collect();
         self.counts_of(&self.choice(last)).total()
     }
 
@@ -247,15 +259,46 @@ impl FactoredProgram {
         read.chain([self.acts]).collect()
     }
 
+    /// A choice of pieces with those limbs in their late modes that cannot follow their early rows at given inputs;
+    /// `fused(a, b, c)` is `a · b + c`.
+    ///
+    /// # Panics
+    /// If an input is missing.
+    #[must_use]
+    pub fn with_late<S: Real>(&self, choice: &Choice, inputs: &[S], fused: impl Fn(S, S, S) -> S + Copy) -> Choice {
+        let mut limbs = choice.limbs.clone();
+        for (g, group) in self.groups.iter().enumerate() {
+            let mode = &group.modes[limbs[g]];
+            if let Some(late) = mode.late {
+                let pieces = [&self.always, &self.touching, &mode.inward];
+                let numbers = self.evaluate_pieces(pieces.map(|piece| (piece, 0)), inputs, fused);
+                if numbers.kept[self.early_rows_act + g].to_f64() == 0.0 {
+                    limbs[g] = late;
+                }
+            }
+        }
+        self.choice(limbs)
+    }
+
     /// Results for given inputs in one set of modes; `fused(a, b, c)` is `a · b + c`.
     ///
     /// # Panics
     /// If an input is missing.
     pub fn evaluate<S: Scalar>(&self, choice: &Choice, inputs: &[S], fused: impl Fn(S, S, S) -> S + Copy) -> Vec<S> {
+        self.evaluate_pieces(self.run(choice), inputs, fused).results
+    }
+
+    /// What pieces compute, each with the number of the part that is its own.
+    fn evaluate_pieces<'a, S: Scalar>(
+        &self,
+        pieces: impl IntoIterator<Item = (&'a Piece, usize)>,
+        inputs: &[S],
+        fused: impl Fn(S, S, S) -> S + Copy,
+    ) -> Numbers<S> {
         let zero = S::zero();
         let (mut results, mut kept) = (vec![zero; self.results], vec![zero; self.kept]);
         let mut parts = vec![vec![zero; self.part]; self.groups.len()];
-        for (piece, own) in self.run(choice) {
+        for (piece, own) in pieces {
             let given = piece.inputs.iter().map(|source| match *source {
                 Source::Given(k) => inputs[k],
                 Source::Kept(k) => kept[k],
@@ -272,6 +315,12 @@ impl FactoredProgram {
                 }
             }
         }
-        results
+        Numbers { results, kept }
     }
+}
+
+/// Numbers that pieces have computed.
+struct Numbers<S> {
+    results: Vec<S>,
+    kept: Vec<S>,
 }

@@ -49,6 +49,8 @@ pub(super) enum Slot {
 pub(super) enum Wanted {
     Result(usize),
     Symbol(Symbol),
+    /// Whether all early rows of a limb act.
+    EarlyRowsAct(usize),
     /// Number `entry` of the multipliers of the `place`-th limb that touches.
     Multiplier {
         place: usize,
@@ -265,11 +267,15 @@ impl<'g, 'a> Cutting<'g, 'a> {
         let handed = |late: usize| {
             traced.from_limbs[late].iter().all(|(crossing, e)| {
                 let limb = self.tracing.limb_of_crossing(*crossing);
-                let alone = limb.and_then(|g| self.alone[&(g, set[g])].from_limbs[late].get(crossing));
-                limb.is_none() || alone.is_some_and(|alone| result_of(*alone) == result_of(*e))
+                limb.is_none_or(|g| self.handed_by((g, set[g]), late, crossing) == result_of(*e))
             })
         };
         results && handed(0) && handed(1)
+    }
+
+    /// What a limb hands over in one of its modes, alone: nothing where a sweep is not needed.
+    fn handed_by(&self, limb: (usize, usize), late: usize, crossing: &Crossing) -> ProgramResult {
+        self.alone[&limb].from_limbs[late].get(crossing).map_or(ProgramResult::Const(0.0), |e| result_of(*e))
     }
 
     /// What a node is a symbol for.
@@ -293,9 +299,10 @@ impl<'g, 'a> Cutting<'g, 'a> {
         let used = self.handed_entries()?;
         // What crosses from a limb in all modes, in one of them.
         let crossing = |(g, m): (usize, usize), late: usize, symbol: fn(Crossing) -> Symbol| {
-            let all = self.alone[&(g, m)].from_limbs[late].iter();
-            let own = all.filter(|(key, _)| self.tracing.limb_of_crossing(**key) == Some(g));
-            own.map(|(key, e)| (result_of(*e), Wanted::Symbol(symbol(*key)))).collect::<Vec<_>>()
+            let modes = (0..self.tracing.limbs[g].modes.len()).map(|m| &self.alone[&(g, m)].from_limbs[late]);
+            let all: BTreeSet<Crossing> = modes.flat_map(|of| of.keys().copied()).collect();
+            let own = all.into_iter().filter(|key| self.tracing.limb_of_crossing(*key) == Some(g));
+            own.map(|key| (self.handed_by((g, m), late, &key), Wanted::Symbol(symbol(key)))).collect::<Vec<_>>()
         };
         add(Slot::Always, 0, true, results((0, 0), Writer::Always));
         for (g, limb) in self.tracing.limbs.iter().enumerate() {
@@ -308,6 +315,8 @@ impl<'g, 'a> Cutting<'g, 'a> {
                     })
                     .collect();
                 handed.extend(crossing((g, m), 0, Symbol::FromLimb));
+                let act = self.alone[&(g, m)].early_rows_act;
+                handed.extend(act.map(|e| (result_of(e), Wanted::EarlyRowsAct(g))));
                 let returned = self.tracing.returned.get(&(g, m)).into_iter().flatten().enumerate();
                 let mut after: Vec<(ProgramResult, Wanted)> = returned
                     .map(|(entry, id)| {

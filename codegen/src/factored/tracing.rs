@@ -8,13 +8,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use mbd_runtime::contact::{Contact, Mode};
+use mbd_runtime::contact::{rows_that_act, Contact, Mode};
 use mbd_runtime::tree::Unknown;
 use mbd_runtime::Scalar;
 
-use super::limbs::{limbs, of_contacts, reaches, trunk, Limb, MOST_LIMB_MODES};
+use super::limbs::{limbs, of_contacts, reaches, reaches_of, trunk, Limb, MOST_LIMB_MODES};
 use super::symbols::{Class, Crossing, Symbol};
-use crate::options::Options;
+use crate::options::{Arithmetic, Options};
 use crate::output::{InputArray, Output};
 use crate::plan::Plan;
 use crate::rolled::{nodes, OutputSweeps};
@@ -49,6 +49,8 @@ pub struct Traced<'g> {
     pub from_limbs: [BTreeMap<Crossing, Expr<'g>>; 2],
     /// Values of the multipliers of contacts: level, unknown, value.
     pub multipliers: Vec<(usize, usize, Expr<'g>)>,
+    /// 1 where all early rows act, 0 where one does not.
+    pub early_rows_act: Option<Expr<'g>>,
 }
 
 /// Runs the sweeps of one output in many sets of modes, in one graph.
@@ -101,9 +103,14 @@ impl<'g, 'a> Tracing<'g, 'a> {
             _ => full,
         };
         let (trunk, root) = trunk(plan);
-        let (limbs, branches) = limbs(full, plan, &trunk)?;
+        let (mut limbs, branches) = limbs(full, plan, &trunk)?;
+        let contacts = full.contacts();
         if limbs.len() > 64 || limbs.iter().map(|limb| limb.modes.len()).sum::<usize>() > MOST_LIMB_MODES {
             return None;
+        }
+        // In exact arithmetic, pieces have the bits of the function for all modes, whose rows are not early.
+        if options.arithmetic == Arithmetic::Fast {
+            limbs.iter_mut().for_each(|limb| take_early(limb, full, &contacts, &trunk));
         }
         let mut tracing = Tracing {
             graph,
@@ -124,7 +131,7 @@ impl<'g, 'a> Tracing<'g, 'a> {
             full,
             output,
             options,
-            contacts: full.contacts(),
+            contacts,
             trunk,
             root,
             branches,
@@ -157,6 +164,13 @@ impl<'g, 'a> Tracing<'g, 'a> {
         tracing.handed.clear();
         tracing.returned.clear();
         Some(tracing)
+    }
+
+    /// The plan in a set of modes.
+    pub fn plan(&self, set: &[usize]) -> Plan {
+        let plan = self.full.acting(&rows_that_act(self.full.dims.rows, &self.contacts, &self.modes(set)));
+        let limbs = self.limbs.iter().zip(set).filter(|(limb, m)| limb.late[**m].is_some());
+        plan.with_early_contacts(&limbs.flat_map(|(limb, _)| &limb.contacts).copied().collect::<Vec<_>>())
     }
 
     /// The modes of all contacts in a set: a number of a mode for each limb.
@@ -257,6 +271,9 @@ impl<'g, 'a> Tracing<'g, 'a> {
     /// The closed contacts of a limb in one of its modes whose rows come to the trunk.
     pub fn reaching_contacts(&self, g: usize, m: usize) -> Vec<usize> {
         let limb = &self.limbs[g];
+        if limb.late[m].is_some() {
+            return Vec::new();
+        }
         let closed = limb.contacts.iter().zip(&limb.modes[m]).filter(|(_, mode)| **mode != Mode::Open);
         closed.map(|(contact, _)| *contact).filter(|contact| self.reaching[*contact]).collect()
     }
@@ -283,11 +300,12 @@ impl<'g, 'a> Tracing<'g, 'a> {
             }
             let (op, _) = self.graph.get(at);
             let plain = Expr::Node { graph: self.graph, id: at, neg: false };
-            if matches!(op, Op::Input(_)) {
+            let class = self.class(at);
+            // A multiplier of a limb is the only input that is given back.
+            if matches!(op, Op::Input(_)) && class.groups == 0 {
                 memo.insert(at, plain);
                 continue;
             }
-            let class = self.class(at);
             if class.is_early() {
                 let handed = if self.of_limbs(at) {
                     self.hand_over(set, Handed { id: at, neg: false, kind: Kind::Other })
@@ -328,6 +346,22 @@ impl<'g, 'a> Tracing<'g, 'a> {
         let entry = entry_of(self.returned.entry((g, set[g])).or_default(), id);
         Some(self.symbol_for(Symbol::Returned { place, entry }))
     }
+}
+
+/// Has rows be eliminated in a limb in those of its modes in which it can follow all that would come to the trunk.
+fn take_early(limb: &mut Limb, full: &Plan, contacts: &[Contact<f64>], trunk: &[bool]) {
+    let own = limb.contacts.clone();
+    limb.take_early(|of_limb| {
+        let mut modes = vec![Mode::Open; contacts.len()];
+        own.iter().zip(of_limb).for_each(|(contact, mode)| modes[*contact] = *mode);
+        let plan = full.acting(&rows_that_act(full.dims.rows, contacts, &modes));
+        let early = plan.early_contacts();
+        let at_ends = |plan: &Plan| {
+            let plan = plan.with_early_contacts(&early);
+            of_contacts(full).all(|index| !reaches_of(&plan, &full.constraints[index].slots, trunk))
+        };
+        !early.is_empty() && at_ends(&plan) && plan.accelerations.as_deref().is_none_or(at_ends)
+    });
 }
 
 /// Place of a node in a list, to which it is added if it is new.

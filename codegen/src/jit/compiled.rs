@@ -12,11 +12,13 @@ use mbd_runtime::Interpreter;
 use super::columns::Several;
 use super::given::Given;
 use super::instructions::width;
+use super::interpreted::interpret;
 use super::lanes::AllLanes;
-use super::memory::{MachineCode, Number};
+use super::memory::{MachineCode, Number, RESULTS};
 use super::{vectors, CompileError};
 use crate::code::{compile, Code};
 use crate::model::{Gravity, Model};
+use crate::modes::OF_EACH_SET;
 use crate::options::{Arithmetic, Options};
 use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
@@ -61,6 +63,8 @@ pub struct Compiled<S: Number = f64> {
     pub(super) asks: bool,
     /// Calls of each of [`Output::ALL`], counted up to that number.
     calls: Vec<u32>,
+    /// Calls in which early rows did not act.
+    late_calls: u32,
     pub(super) params: Vec<S>,
     /// 1 for each row that acts, 0 for one that does not, where that is an input.
     pub(super) acts: Vec<S>,
@@ -77,10 +81,14 @@ pub struct Compiled<S: Number = f64> {
 #[derive(Debug)]
 pub(super) struct Shared<S> {
     plan: Plan,
+    /// The same with [early rows](Plan::with_early_contacts), for one state and the outputs [`OF_EACH_SET`].
+    early: Option<Plan>,
     options: Options,
     sizes: Sizes,
     /// One for each of [`Output::ALL`].
     outputs: [OnceLock<Result<MachineCode<S>, CompileError>>; Output::ALL.len()],
+    /// The same without early rows, for states in which these do not act.
+    late: [OnceLock<Result<MachineCode<S>, CompileError>>; OF_EACH_SET.len()],
     coordinate_rates: OnceLock<Result<MachineCode<S>, CompileError>>,
     /// The same with only some rows of the constraints, by the rows that act.
     reduced: Mutex<BTreeMap<Vec<bool>, Arc<Shared<S>>>>,
@@ -93,9 +101,27 @@ pub(super) struct Shared<S> {
 impl<S: Number> Shared<S> {
     /// Nothing is compiled yet.
     fn new(plan: Plan, options: Options, sizes: Sizes) -> Self {
-        let outputs = std::array::from_fn(|_| OnceLock::new());
+        let (outputs, late) =
+            (std::array::from_fn(|_| OnceLock::new()), [const { OnceLock::new() }; OF_EACH_SET.len()]);
         let (coordinate_rates, reduced, lanes) = (OnceLock::new(), Mutex::default(), AllLanes::default());
-        Shared { plan, options, sizes, outputs, coordinate_rates, reduced, implicit: OnceLock::new(), lanes }
+        let (early, implicit) = (None, OnceLock::new());
+        Shared { plan, early, options, sizes, outputs, late, coordinate_rates, reduced, implicit, lanes }
+    }
+
+    /// The same with early rows, where some pay.
+    fn with_early_rows(self) -> Self {
+        // In exact arithmetic, code has the bits of the interpreter, whose rows are not early.
+        let early = match self.options.arithmetic {
+            Arithmetic::Exact => Vec::new(),
+            Arithmetic::Fast => self.plan.early_contacts(),
+        };
+        Shared { early: (!early.is_empty()).then(|| self.plan.with_early_contacts(&early)), ..self }
+    }
+
+    /// The code of an output that has early rows, without these.
+    fn late(&self, output: Output) -> Option<&MachineCode<S>> {
+        let k = OF_EACH_SET.iter().position(|other| *other == output)?;
+        self.late[k].get_or_init(|| self.compiled_from(&self.plan, output, 1)).as_ref().ok()
     }
 
     pub(super) fn sizes(&self) -> &Sizes {
@@ -110,7 +136,12 @@ impl<S: Number> Shared<S> {
 
     /// Compiles an output, if it is not too large.
     pub(super) fn compiled(&self, output: Output, lanes: usize) -> Result<MachineCode<S>, CompileError> {
-        let (plan, options, most) = (&self.plan, &self.options, MOST_OPERATIONS);
+        let early = self.early.as_ref().filter(|_| lanes == 1 && OF_EACH_SET.contains(&output));
+        self.compiled_from(early.unwrap_or(&self.plan), output, lanes)
+    }
+
+    fn compiled_from(&self, plan: &Plan, output: Output, lanes: usize) -> Result<MachineCode<S>, CompileError> {
+        let (options, most) = (&self.options, MOST_OPERATIONS);
         if plan.nodes.len() > MOST_BODIES && rolled(plan, output, options).is_none() {
             return Err(CompileError::TooLarge { output, operations: None, most });
         }
@@ -189,6 +220,7 @@ impl<S: Number> Compiled<S> {
             patience: 0,
             asks: false,
             calls: Vec::new(),
+            late_calls: 0,
             params,
             acts,
             scratch: Vec::new(),
@@ -305,14 +337,40 @@ impl<S: Number> Compiled<S> {
         arguments: &[&[S]],
         results: &mut [&mut [S]],
     ) -> Result<(), CompileError> {
-        let code = self.shared.output(output).map_err(CompileError::clone)?;
+        self.prepare(output)?;
         self.check_arrays(output, arguments, results)?;
         let given = |k: usize| arguments.get(k).copied().unwrap_or_default();
-        let scratch = long_enough(&mut self.scratch, code);
-        let arguments = [given(0), given(1), given(2)];
-        let given = Given::new(code, arguments, (&self.interpreter, &self.params, &self.acts));
-        code.call(&given, results, scratch);
+        if !self.call(output, [given(0), given(1), given(2)], results) {
+            interpret(self, output, arguments, results);
+        }
         Ok(())
+    }
+
+    /// Runs the code of an output whose arrays are right. Returns whether there is some: not where early rows do not act
+    /// and the code without these has not been asked for often; the results are wrong then.
+    fn call(&mut self, output: Output, arguments: [&[S]; 3], results: &mut [&mut [S]]) -> bool {
+        let Ok(code) = self.shared.output(output) else { return false };
+        let more = (&self.interpreter, &self.params[..], &self.acts[..]);
+        let scratch = long_enough(&mut self.scratch, code);
+        // Code for one state never gives up.
+        if code.results() == results.len() {
+            return code.call(&Given::new(code, arguments, more), results, scratch);
+        }
+        let (mut act, count) = ([S::zero()], results.len());
+        let mut all: [&mut [S]; RESULTS] = Default::default();
+        let own = results.iter_mut().map(|result| &mut **result).chain([&mut act[..]]);
+        all.iter_mut().zip(own).for_each(|(to, result)| *to = result);
+        code.call(&Given::new(code, arguments, more), &mut all[..=count], scratch);
+        if act[0] != S::zero() {
+            return true;
+        }
+        self.late_calls = (self.late_calls + 1).min(Self::WORTHWHILE);
+        if self.late_calls < Self::WORTHWHILE {
+            return false;
+        }
+        let Some(code) = self.shared.late(output) else { return false };
+        let scratch = long_enough(&mut self.scratch, code);
+        code.call(&Given::new(code, arguments, more), results, scratch)
     }
 
     /// Whether an output is, or may be, still interpreted although its code is made.
@@ -348,12 +406,7 @@ impl<S: Number> Compiled<S> {
         if self.interprets(output) {
             return false;
         }
-        let Ok(code) = self.shared.output(output) else { return false };
-        let scratch = long_enough(&mut self.scratch, code);
-        let given = Given::new(code, arguments, (&self.interpreter, &self.params, &self.acts));
-        // Code for one state never gives up.
-        code.call(&given, &mut results, scratch);
-        true
+        self.call(output, arguments, &mut results)
     }
 
     /// Whether the interpreter computes an output now; the call is counted. Code that another clone has had made is taken at
@@ -415,7 +468,7 @@ impl<S: Number> Compiled<S> {
     /// parameters and the gravity of this one, and other inputs that are zero.
     fn with_rows(&self, acts: &[bool]) -> Self {
         let Shared { plan, options, sizes, reduced, .. } = &*self.shared;
-        let make = || Arc::new(Shared::new(plan.acting(acts), options.clone(), *sizes));
+        let make = || Arc::new(Shared::new(plan.acting(acts), options.clone(), *sizes).with_early_rows());
         let mut reduced = reduced.lock().unwrap_or_else(PoisonError::into_inner);
         let shared = reduced.entry(acts.to_vec()).or_insert_with(make).clone();
         let (interpreter, calls) = (self.current().acting(acts), vec![0; self.calls.len()]);

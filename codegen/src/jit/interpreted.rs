@@ -65,7 +65,12 @@ fn check<S>(spec: &Spec, sizes: &Sizes, arguments: &[&[S]], results: &[&mut [S]]
 }
 
 /// Computes an output whose arrays are right; `None` where the interpreter does not have it.
-fn interpret<S: Number>(of: &mut Compiled<S>, output: Output, given: &[&[S]], to: &mut [&mut [S]]) -> Option<()> {
+pub(super) fn interpret<S: Number>(
+    of: &mut Compiled<S>,
+    output: Output,
+    given: &[&[S]],
+    to: &mut [&mut [S]],
+) -> Option<()> {
     let interpreter = of.inputs();
     match (output, given, to) {
         (Output::Rates, [q, p], [qd, pd]) => interpreter.rates(q, p, &mut vec![S::zero(); p.len()], qd, pd),

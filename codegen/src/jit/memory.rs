@@ -298,6 +298,11 @@ impl<S: Number> MachineCode<S> {
         self.size
     }
 
+    /// Number of results.
+    pub fn results(&self) -> usize {
+        self.results.0
+    }
+
     /// Length of the working memory that a call needs.
     pub fn scratch(&self) -> usize {
         self.scratch

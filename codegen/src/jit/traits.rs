@@ -146,6 +146,10 @@ impl<S: Number> Constrained for Compiled<S> {
         augmented[..p.len()].copy_from_slice(p);
         let arguments = [&q[..], &augmented[..p.len()], &[]];
         let compiled = self.run(Output::ProjectMomenta, arguments, [v, p, sigma]);
+        if !compiled {
+            // Code whose early rows do not act has written what it found.
+            p.iter_mut().zip(&augmented).for_each(|(p, given)| *p = *given);
+        }
         self.copies = augmented;
         if !compiled {
             self.interpreting().project_momenta(t, q, p, v, sigma);

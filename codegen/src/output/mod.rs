@@ -21,6 +21,9 @@ const A: Array = Array::new("a", &[Nv]);
 const P: Array = Array::new("p", &[Nv]);
 const QD: Array = Array::new("qd", &[Nq]);
 const PD: Array = Array::new("pd", &[Nv]);
+const FREED: Array = Array::new("freed", &[Nv]);
+const SIGMA: Array = Array::new("sigma", &[Rows]);
+const LAMBDA: Array = Array::new("lambda", &[Rows]);
 
 const fn square(name: &'static str) -> Array {
     Array::new(name, &[Nv, Nv])
@@ -148,8 +151,8 @@ outputs! {
     /// Velocities, momenta freed of the constraints' multipliers `σ`, and these: `p − Φᵀσ = M v`.
     ProjectMomenta = Spec::new("project_momenta", &[Q, P], &[
         V,
-        Array::new("freed", &[Nv]),
-        Array::new("sigma", &[Rows]),
+        FREED,
+        SIGMA,
     ]).only(WithConstraints);
     /// Residuals `φ(q)` of the constraints, Newton's step onto the closed positions, and its pivots. The step is `δq =
     /// −M⁻¹Φᵀ(Φ M⁻¹Φᵀ)⁻¹φ`; the pivots are those of `Φ M⁻¹Φᵀ`, zero where a row was left out as redundant.
@@ -160,7 +163,7 @@ outputs! {
     ]).only(WithConstraints);
     /// Multipliers `λ` of the constraints, N and N m.
     /// The constraints act on the joints with `−Φᵀλ`.
-    Multipliers = Spec::new("multipliers", &[Q, V], &[Array::new("lambda", &[Rows])]).only(WithConstraints);
+    Multipliers = Spec::new("multipliers", &[Q, V], &[LAMBDA]).only(WithConstraints);
     /// Gaps of the contacts: residuals of all rows, their velocities `Φ v`, and the entries of `Φ`, whatever acts.
     /// Of a contact's normal row the residual is the gap, m or rad, negative where bodies overlap; velocities are in m/s
     /// or rad/s, those of prescribed motions included.
@@ -171,7 +174,30 @@ outputs! {
     ]).only(WithContacts);
 }
 
+/// Whether all early rows act, as the last result of a function for modes of contacts.
+const EARLY_ROWS_ACT: Array = Array::new("early_rows_act", &[Const(1)]);
+
 impl Output {
+    /// Its row of the table for a plan whose early rows may be unable to act: whether they do is one more result, which is
+    /// returned.
+    pub(crate) const fn with_early_rows(self) -> &'static Spec {
+        /// The row of an output with one more result.
+        macro_rules! with {
+            ($output:ident, $results:expr) => {{
+                const SPEC: Spec = Spec { results: $results, ..*Output::$output.spec() };
+                const RETURNED: Spec = SPEC.returned();
+                &RETURNED
+            }};
+        }
+        match self {
+            Output::Rates => with!(Rates, &[QD, PD, EARLY_ROWS_ACT]),
+            Output::ProjectMomenta => with!(ProjectMomenta, &[V, FREED, SIGMA, EARLY_ROWS_ACT]),
+            Output::Multipliers => with!(Multipliers, &[LAMBDA, EARLY_ROWS_ACT]),
+            // No other output has functions for sets of modes.
+            _ => self.spec(),
+        }
+    }
+
     /// What is computed unless something else is asked for. Models with constraints then also get the outputs that only
     /// they have.
     pub const DEFAULT: &'static [Output] = &[Output::Rates, Output::Momenta, Output::Energy];

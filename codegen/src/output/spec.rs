@@ -161,7 +161,7 @@ pub struct Spec {
     pub inputs: &'static [Array],
     /// Results of the function, in order.
     pub results: &'static [Array],
-    /// Whether the one result is returned; otherwise results are written to arguments.
+    /// Whether the last result is returned; the others are written to arguments.
     pub returned: bool,
     /// A type of the runtime whose fields the results are in Rust, so that no two arrays can be exchanged: the one
     /// argument that is written. Its parameters are the shapes of the results, each once, in the order of the results.

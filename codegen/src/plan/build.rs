@@ -33,6 +33,7 @@ impl Plan {
             constraints: Vec::new(),
             contact_frames,
             acts: RowsThatAct::All,
+            early_tolerance: None,
             notices,
             matrix_depth: 0,
             accelerations: None,

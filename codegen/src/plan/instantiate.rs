@@ -138,6 +138,7 @@ impl Plan {
             wrenches: wrenches.collect(),
             constraints: self.constraints.iter().map(|c| c.instantiate(params)).collect(),
             tolerance: S::rank_tolerance(),
+            early_tolerance: self.early_tolerance,
             row_factors: None,
             joint_nodes: self.joint_nodes.clone(),
             matrix_depth: self.matrix_depth,
@@ -220,7 +221,14 @@ impl PlanConstraint {
             PlanBond::Cut { kind, frames, paths: [path_a, path_b] } => {
                 let [a, b] = frames.each_ref().map(|f| TreeFrame { node: f.node, place: steps(&f.pose, params) });
                 let closure = kind.closure().map(|v| value(v, params));
-                Bond::Cut(Cut { closure, a, b, path_a: path_a.clone(), path_b: path_b.clone() })
+                Bond::Cut(Cut {
+                    closure,
+                    grounded: a.node.is_some() != b.node.is_some(),
+                    a,
+                    b,
+                    path_a: path_a.clone(),
+                    path_b: path_b.clone(),
+                })
             }
             PlanBond::Coupling { terms, offset } => Bond::Coupling {
                 terms: terms.iter().map(|(i, ratio)| (*i, value(*ratio, params))).collect(),
@@ -230,6 +238,6 @@ impl PlanConstraint {
         let decay = (self.decay != Value::ZERO).then(|| value(self.decay, params));
         let (slots, passes, velocities) = (self.slots.clone(), self.passes.clone(), self.velocities.clone());
         let (first, entry) = (self.first, self.entry);
-        Constraint { bond, slots, passes, first, entry, velocities, decay, compliance: None }
+        Constraint { bond, slots, passes, first, entry, velocities, decay, compliance: None, own_axes: false }
     }
 }

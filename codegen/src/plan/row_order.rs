@@ -126,7 +126,7 @@ impl Plan {
 }
 
 /// At the start and at positions beside it, which need not be closed.
-fn products(plan: &Plan) -> Vec<RowProducts> {
+pub(super) fn products(plan: &Plan) -> Vec<RowProducts> {
     let params = plan.default_params();
     let mut interpreter = Interpreter::new(plan.tree(&params), [0.0; 3]);
     let start = plan.start();

@@ -126,6 +126,8 @@ pub struct Plan {
     pub contact_frames: Vec<Option<[PlanFrame; 2]>>,
     /// Which of its rows act.
     pub acts: RowsThatAct,
+    /// See [`mbd_runtime::tree::Tree`]: of a plan of [`Plan::with_early_contacts`].
+    pub early_tolerance: Option<f64>,
     /// Notices about changes, such as angles that became right angles.
     pub notices: Vec<String>,
     /// See [`mbd_runtime::tree::Tree`].

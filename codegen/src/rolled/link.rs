@@ -129,6 +129,7 @@ impl<'g, 'a> Link<'g, 'a> {
             wrenches: Vec::new(),
             constraints,
             tolerance: Expr::rank_tolerance(),
+            early_tolerance: None,
             row_factors: None,
             frames: Vec::new(),
             joint_nodes: Vec::new(),
@@ -293,15 +294,17 @@ fn stand_in<'g>(constraint: &Constraint<Expr<'_>>, run: &Run) -> Constraint<Expr
         Bond::Cut(cut) => [on_path(&cut.path_a), on_path(&cut.path_b)],
         Bond::Coupling { .. } => [Vec::new(), Vec::new()],
     };
+    let grounded = matches!(&constraint.bond, Bond::Cut(cut) if cut.grounded);
     let nowhere = || TreeFrame { node: None, place: Vec::new() };
     Constraint {
-        bond: Bond::Cut(Cut { closure: Closure::Fixed, a: nowhere(), b: nowhere(), path_a, path_b }),
+        bond: Bond::Cut(Cut { closure: Closure::Fixed, a: nowhere(), b: nowhere(), path_a, path_b, grounded }),
         slots: constraint.slots.clone(),
         passes: Vec::new(),
         first: constraint.first,
         entry: constraint.entry,
         decay: None,
         compliance: None,
+        own_axes: false,
         velocities: Vec::new(),
     }
 }

@@ -185,6 +185,12 @@ impl<'g, 'a> PassState<'g, 'a> {
     }
 
     #[cfg(feature = "factored")]
+    /// [`mbd_runtime::sweep::Sweeps::early_rows_act`], after the pass of the factorization.
+    pub fn early_rows_act(&self) -> Expr<'g> {
+        Sweeps { tree: &self.tree, trace: self.graph }.early_rows_act(&self.work.factor)
+    }
+
+    #[cfg(feature = "factored")]
     /// The solutions for the unknowns so far: which of the two linear problems (0: velocities, 1: accelerations), which
     /// unknown, and its value.
     pub fn unknowns(&mut self) -> impl Iterator<Item = (usize, usize, &mut Expr<'g>)> {

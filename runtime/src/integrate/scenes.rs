@@ -63,6 +63,7 @@ pub fn empty<S: Scalar>() -> Tree<S> {
         wrenches: vec![],
         constraints: vec![],
         tolerance: S::rank_tolerance(),
+        early_tolerance: None,
         row_factors: None,
         frames: vec![],
         joint_nodes: vec![],

@@ -223,7 +223,13 @@ impl<S: Scalar> Closure<S> {
             Closure::PointOnCylinder { radius } => {
                 rows[0] = force(scale3(S::one() / *radius, at.across()));
             }
-            Closure::RollingDisc { .. } | Closure::RollingBall { .. } | Closure::RollingEllipsoid { .. } => {
+            Closure::RollingBall { radius } => {
+                let [x, y] = [0, 1].map(|k| at.axis(k));
+                rows[0] = force(at.axis(2));
+                rows[1] = Force { lin: x, ang: scale3(-*radius, y) };
+                rows[2] = Force { lin: y, ang: scale3(*radius, x) };
+            }
+            Closure::RollingDisc { .. } | Closure::RollingEllipsoid { .. } => {
                 let contact = self.contact(at);
                 for (row, k) in rows.iter_mut().zip([2, 0, 1]) {
                     *row = at_point(at.axis(k), contact);
@@ -240,6 +246,16 @@ impl<S: Scalar> Closure<S> {
             for (row, t) in rows.iter_mut().zip([touch.normal, tangents[0], tangents[1]]) {
                 *row = at_point(t, touch.at);
             }
+        }
+        rows
+    }
+
+    /// The same for a contact without slip, along the axes of `B`.
+    pub(super) fn directions_in_own_axes(&self, at: &Relative<S>) -> [Force<S>; 6] {
+        let contact = self.contact(at);
+        let mut rows = [Force::zero(); 6];
+        for (k, row) in rows.iter_mut().enumerate().take(3) {
+            *row = at_point(unit::<S>(k).lin, contact);
         }
         rows
     }

@@ -6,7 +6,7 @@
 //! elimination in the order of the tree. Where the paths have met the columns are no longer zero, although the wrenches
 //! cancel there: so they cannot stop there before they are eliminated.
 
-use super::pass::{each_node, visit_force, Sweep, SweepDirection};
+use super::pass::{each_node, visit_force, Context, Sweep, SweepDirection};
 use super::{Quantity, Sweeps, Trace};
 use crate::lists::array;
 use crate::spatial::{Force, Mat3, Motion, Vec3};
@@ -77,6 +77,22 @@ impl<S: Scalar> Constraint<S> {
     }
 }
 
+impl<S> Cut<S> {
+    /// The node that it binds to the ground, and the wrench there of those at both ends; `None` where it binds two nodes.
+    fn end_at_ground(&self, ends: (Force<S>, Force<S>)) -> Option<(usize, Force<S>)> {
+        let (a, b) = (self.a.node.map(|i| (i, ends.0)), self.b.node.map(|i| (i, ends.1)));
+        a.xor(b)
+    }
+}
+
+/// Visits the wrenches of loops through the ground that come to a node.
+fn visit_grounded<S, T>(cx: &mut Context<'_, S, T>, i: usize, visit: &mut dyn FnMut(&mut S)) {
+    let grounded = |c: &Constraint<S>| matches!(&c.bond, Bond::Cut(cut) if cut.grounded);
+    if cx.sweeps.tree.constraints.iter().any(grounded) {
+        visit_force(&mut cx.w.constraints.to_ground[i], visit);
+    }
+}
+
 impl<S: Scalar> Tree<S> {
     /// The constraint that a row belongs to.
     fn constraint_of(&self, row: usize) -> &Constraint<S> {
@@ -130,11 +146,22 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
         }
     }
 
-    /// Multipliers out of the velocities, and the joint forces of constraints whose rows turn. Visits no node.
-    pub(super) const CONSTRAINT_FORCES: Self = Sweep {
+    /// Multipliers out of the velocities. Visits no node.
+    pub(super) const MULTIPLIERS: Self = Sweep {
         needed: |tree| !T::PLAIN && !tree.constraints.is_empty(),
-        end: |cx| cx.sweeps.constraint_forces(cx.w),
+        end: |cx| {
+            let w = &mut *cx.w;
+            cx.sweeps.collect_multipliers(&w.velocity.unknown_rate, &mut w.constraints.multipliers);
+        },
         ..Sweep::idle(SweepDirection::BaseToTip)
+    };
+
+    /// Joint forces of constraints whose rows turn, after [`Sweep::MULTIPLIERS`].
+    pub(super) const CONSTRAINT_FORCES: Self = Sweep {
+        needed: |tree| !T::PLAIN && !tree.constraints.iter().all(Constraint::gauge),
+        begin: |cx| cx.sweeps.constraint_forces(cx.w),
+        carried: |cx, i, visit| visit_grounded(cx, i, visit),
+        ..each_node!(TipToBase, |cx, i| cx.sweeps.constraint_force_node(i, cx.w))
     };
 
     /// Momenta without the multipliers, `p⁺ − Φᵀσ`, after the velocities.
@@ -143,6 +170,7 @@ impl<S: Scalar, T: Trace> Sweep<S, T> {
             cx.results.p.copy_from_slice(cx.given.second);
             cx.sweeps.freed_begin(cx.w);
         },
+        carried: |cx, i, visit| visit_grounded(cx, i, visit),
         running: |cx, visit| cx.w.constraints.end_wrenches.iter_mut().flatten().for_each(|f| visit_force(f, visit)),
         ..each_node!(TipToBase, |cx, i| cx.sweeps.freed_node(i, cx.w, cx.results.p))
     };
@@ -204,7 +232,10 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
             at = self.relative(cut, w.constraints.reach[index], &w.poses);
             residuals = cut.closure.residuals(&at);
         }
-        let directions = cut.closure.directions(&at);
+        let directions = match constraint.own_axes {
+            true => cut.closure.directions_in_own_axes(&at),
+            false => cut.closure.directions(&at),
+        };
         w.constraints.relative[index] = at;
         for (k, r) in constraint.range().enumerate() {
             if self.leaves_out_row(w, r) {
@@ -292,15 +323,23 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 alike = alike + whole;
             }
         }
-        let part = match f.early[g] {
-            true => S::constant(EARLY_TOLERANCE) * (tolerance * tolerance),
-            false => tolerance,
+        let part = match (f.early[g], self.tree.early_tolerance) {
+            (true, Some(part)) => S::constant(part),
+            (true, None) => S::constant(EARLY_TOLERANCE) * (tolerance * tolerance),
+            (false, _) => tolerance,
         };
         let mut floor = part * (alike + tolerance * (all + S::one()));
         if let Some((part, _)) = PASSES.iter().zip(&constraint.passes).find(|(_, slots)| slots.contains(&g)) {
             floor = floor + S::constant(*part) * f.whole[g];
         }
         self.if_acts(r, -(-f.gram[g * ng + g]).reciprocal_above(floor))
+    }
+
+    /// 1 where no early row has been left out, up to rounding errors; 0 where one has. After the factorization.
+    pub fn early_rows_act(&self, f: &Factor<S>) -> S {
+        let ng = self.tree.unknowns.len();
+        let early = (0..ng).filter(|&g| f.early[g]);
+        early.fold(S::one(), |product, g| product * (f.gram[g * ng + g] * f.unknown_pivots[g].rho))
     }
 
     /// `x` where row `r` acts, zero where it does not.
@@ -345,13 +384,11 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     }
 
     /// `Eᵀ` of the wrenches that constraints put on the bodies of their loops as their directions turn,
-    /// `E_c° σ = (Ė_c + Ω_C × E_c) σ`, in [`crate::workspace::Constraints::forces`]; after the velocities.
-    pub(super) fn constraint_forces(&self, w: &mut Workspace<S>) {
-        if self.tree.constraints.is_empty() {
-            return;
-        }
-        self.collect_multipliers(&w.velocity.unknown_rate, &mut w.constraints.multipliers);
+    /// `E_c° σ = (Ė_c + Ω_C × E_c) σ`, in [`crate::workspace::Constraints::forces`]; after the velocities. Those of loops
+    /// through the ground are still at the ends of the loops.
+    fn constraint_forces(&self, w: &mut Workspace<S>) {
         w.constraints.forces.fill(S::zero());
+        w.constraints.to_ground.fill(Force::zero());
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
             let Bond::Cut(cut) = &constraint.bond else { continue };
             if constraint.gauge() {
@@ -380,8 +417,34 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
                 }
             };
             let ends = self.at_nodes(cut, &at, &total, &w.poses);
-            let forces = &mut w.constraints.forces;
-            self.along_loop(cut, ends, &w.poses, |v, f| forces[v] = forces[v] + f);
+            let constraints = &mut w.constraints;
+            match cut.end_at_ground(ends) {
+                Some((node, f)) => constraints.to_ground[node] = constraints.to_ground[node].plus(&f),
+                None => {
+                    let forces = &mut constraints.forces;
+                    self.along_loop(cut, ends, &w.poses, |v, f| forces[v] = forces[v] + f);
+                }
+            }
+        }
+    }
+
+    /// Wrenches of loops through the ground along the freedoms of node `i`, after its children.
+    fn constraint_force_node(&self, i: usize, w: &mut Workspace<S>) {
+        let mut forces = core::mem::take(&mut w.constraints.forces);
+        self.grounded_node(i, w, &mut |v, f| forces[v] = forces[v] + f);
+        w.constraints.forces = forces;
+    }
+
+    /// Calls `visit` with the velocities of node `i` and what the wrenches of loops through the ground are along them, after its
+    /// children; hands these wrenches to its parent.
+    fn grounded_node(&self, i: usize, w: &mut Workspace<S>, visit: &mut impl FnMut(usize, S)) {
+        if !w.constraints.grounded[i] {
+            return;
+        }
+        self.trace.at(Some(i), Quantity::Constraint);
+        let f = self.along_joint(i, &w.constraints.to_ground[i], &w.poses, visit);
+        if let Some(parent) = self.tree.nodes[i].parent {
+            w.constraints.to_ground[parent] = w.constraints.to_ground[parent].plus(&f);
         }
     }
 
@@ -412,25 +475,32 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     fn freed_begin(&self, w: &mut Workspace<S>) {
         self.collect_multipliers(&w.velocity.unknown_rate, &mut w.constraints.multipliers);
         w.constraints.multipliers.iter_mut().for_each(|x| *x = -*x);
+        w.constraints.to_ground.fill(Force::zero());
         for (index, constraint) in self.tree.constraints.iter().enumerate() {
-            let Bond::Cut(_) = &constraint.bond else { continue };
+            let Bond::Cut(cut) = &constraint.bond else { continue };
             self.trace.at(None, Quantity::Constraint);
             let (rows, multipliers) = (&w.constraints.rows, &w.constraints.multipliers);
             let sum = |of: fn(&crate::workspace::RowState<S>) -> Force<S>| {
                 let each = constraint.range().map(|r| of(&rows[r]).times(multipliers[r]));
                 each.fold(Force::zero(), |sum, f| sum.plus(&f))
             };
-            w.constraints.end_wrenches[index] = [sum(|row| row.at_a), sum(|row| row.at_b)];
+            let ends = (sum(|row| row.at_a), sum(|row| row.at_b));
+            match cut.end_at_ground(ends) {
+                Some((node, f)) => w.constraints.to_ground[node] = w.constraints.to_ground[node].plus(&f),
+                None => w.constraints.end_wrenches[index] = [ends.0, ends.1],
+            }
         }
     }
 
     /// `Φᵀ` times the multipliers of [`Sweeps::freed_begin`] along the freedoms of node `i`, added to `p`, after its
     /// children.
     fn freed_node(&self, i: usize, w: &mut Workspace<S>, p: &mut [S]) {
+        self.grounded_node(i, w, &mut |v, x| p[v] = p[v] + x);
         self.trace.at(Some(i), Quantity::Constraint);
         for &(index, part) in &w.constraints.through[i] {
             let constraint = &self.tree.constraints[index];
             match &constraint.bond {
+                Bond::Cut(cut) if cut.grounded => {}
                 Bond::Cut(_) => {
                     let f = &mut w.constraints.end_wrenches[index][part];
                     *f = self.along_joint(i, f, &w.poses, &mut |v, x| p[v] = p[v] + x);

@@ -43,7 +43,7 @@ impl<S: Scalar, T: Trace> SweepList<S, T, 6> {
     };
 }
 
-impl<S: Scalar, T: Trace> SweepList<S, T, 13> {
+impl<S: Scalar, T: Trace> SweepList<S, T, 14> {
     /// `(q, p) → (v, q̇, ṗ)`.
     pub const RATES: Self = SweepList {
         sweeps: [
@@ -57,6 +57,7 @@ impl<S: Scalar, T: Trace> SweepList<S, T, 13> {
             Sweep::MOMENT,
             Sweep::GRAVITY,
             Sweep::WRENCHES,
+            Sweep::MULTIPLIERS,
             Sweep::CONSTRAINT_FORCES,
             Sweep::ACCUMULATED_MOMENTA,
             Sweep::MOMENTUM_RATES,

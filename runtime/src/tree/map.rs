@@ -24,6 +24,7 @@ impl<S: Scalar> Tree<S> {
                 .collect(),
             constraints: self.constraints.iter().map(|c| c.map(of)).collect(),
             tolerance: of(self.tolerance),
+            early_tolerance: self.early_tolerance,
             row_factors: self.row_factors.as_ref().map(|factors| factors.iter().map(|x| of(*x)).collect()),
             frames: self.frames.iter().map(|f| f.map(of)).collect(),
             joint_nodes: self.joint_nodes.clone(),
@@ -85,6 +86,7 @@ impl<S: Scalar> Constraint<S> {
     fn map<R: Scalar>(&self, of: &impl Fn(S) -> R) -> Constraint<R> {
         let bond = match &self.bond {
             Bond::Cut(cut) => Bond::Cut(Cut {
+                grounded: cut.grounded,
                 closure: cut.closure.map(of),
                 a: cut.a.map(of),
                 b: cut.b.map(of),
@@ -104,6 +106,7 @@ impl<S: Scalar> Constraint<S> {
             velocities: self.velocities.clone(),
             decay: self.decay.map(of),
             compliance: self.compliance.map(of),
+            own_axes: self.own_axes,
         }
     }
 }

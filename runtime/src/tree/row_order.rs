@@ -188,33 +188,54 @@ pub fn order_rows(lists: &mut dyn RowLists, mut at: Vec<RowProducts>, large: f64
 
 /// Whether the order loses digits at one position: a row that is nearly dependent on those before it is eliminated, and
 /// others come after it, or an early row can hardly be followed by the joints before it.
-fn loses_digits(lists: &dyn RowLists, mut at: RowProducts) -> bool {
-    let early = early_rows(lists);
+fn loses_digits(lists: &dyn RowLists, at: RowProducts) -> bool {
     let all = (0..lists.nodes()).flat_map(|i| solved(lists, i)).chain(lists.ground().iter().copied());
     let mut rest = all.filter(|&g| lists.row(g).is_some()).count();
-    let mut loses = |at: &mut RowProducts, g: usize, early: bool| {
-        let Some(r) = lists.row(g) else { return false };
+    let mut loses = false;
+    each_row(lists, at, &mut |at, _, r, early| {
         rest -= 1;
-        let small = match early {
+        loses |= match early {
             true => at.followed(r) < SMALL,
             false => (NOTHING..SMALL).contains(&at.left(r)) && rest > 0,
         };
-        at.eliminate(r);
-        small
+    });
+    loses
+}
+
+/// Early rows, as unknowns, that are zero at one of the positions, or of which the joints before them can follow next to nothing.
+pub fn not_followed(lists: &dyn RowLists, at: &[RowProducts]) -> BTreeSet<usize> {
+    let mut rows = BTreeSet::new();
+    for at in at {
+        each_row(lists, at.clone(), &mut |at, g, r, early| {
+            if early && (at.is_zero(r) || at.followed(r) < EARLY) {
+                rows.insert(g);
+            }
+        });
+    }
+    rows
+}
+
+/// Eliminates all rows in their order. Before each calls `visit` with what is left of the products, the unknown, its row,
+/// and whether it is early.
+fn each_row(lists: &dyn RowLists, mut at: RowProducts, visit: &mut dyn FnMut(&RowProducts, usize, usize, bool)) {
+    let early = early_rows(lists);
+    let mut eliminate = |at: &mut RowProducts, i: Option<usize>, list: &[usize]| {
+        for &g in list {
+            if let Some(r) = lists.row(g) {
+                visit(at, g, r, i.is_some_and(|i| early.contains(&(i, g))));
+                at.eliminate(r);
+            }
+        }
     };
     for i in (0..lists.nodes()).rev() {
         let Elimination { solve_before, solve_after, .. } = lists.elimination(i);
-        if solve_before.iter().any(|&g| loses(&mut at, g, early.contains(&(i, g)))) {
-            return true;
-        }
+        eliminate(&mut at, Some(i), solve_before);
         if rows_are_left(lists, i) {
             at.eliminate_node(i);
         }
-        if solve_after.iter().any(|&g| loses(&mut at, g, early.contains(&(i, g)))) {
-            return true;
-        }
+        eliminate(&mut at, Some(i), solve_after);
     }
-    lists.ground().iter().any(|&g| loses(&mut at, g, false))
+    eliminate(&mut at, None, lists.ground());
 }
 
 /// Unknowns that are solved at node `i`.

@@ -115,6 +115,7 @@ pub fn rotor() -> Interpreter<f64> {
         wrenches: vec![],
         constraints: vec![],
         tolerance: 1e-10,
+        early_tolerance: None,
         row_factors: None,
         frames: vec![],
         joint_nodes: vec![],

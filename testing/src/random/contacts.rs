@@ -60,3 +60,34 @@ pub fn with_contacts(seed: u64) -> Option<Model> {
         .map(|read| read.model)
         .filter(|m| !m.contacts.is_empty())
 }
+
+/// A random robot: a floating trunk with two to four legs of two to five joints, with a foot on each that touches one floor.
+pub fn legged(seed: u64) -> Model {
+    let mut rng = Rng::new(seed, 73);
+    let mut text = String::from("name = \"legged\"\n[[shape]]\nname = \"floor\"\ntype = \"plane\"\n");
+    let mut bodies = 0;
+    let mut body = |rng: &mut Rng, text: &mut String, joint: &str, parent: Option<&str>| {
+        let name = format!("b{bodies}");
+        bodies += 1;
+        let [com, xyz, rpy] = [0.05, 0.2, 1.5].map(|size| [0; 3].map(|_| rng.around(size)));
+        let (mass, inertia) = (rng.range(0.2, 1.5), [0; 3].map(|_| rng.range(0.004, 0.006)));
+        *text += &format!("[[body]]\nname = \"{name}\"\nmass = {mass:?}\ncom = {com:?}\ninertia = {inertia:?}\n");
+        *text += &format!("[[joint]]\nname = \"j{name}\"\ntype = \"{joint}\"\nchild = \"{name}\"\n");
+        if let Some(parent) = parent {
+            *text += &format!("parent = \"{parent}\"\nxyz = {xyz:?}\nrpy = {rpy:?}\n");
+        }
+        name
+    };
+    let trunk = body(&mut rng, &mut text, "floating", None);
+    for leg in 0..2 + rng.below(3) {
+        let mut last = trunk.clone();
+        for _ in 0..2 + rng.below(4) {
+            let joint = rng.pick(&["revolute", "revolute", "revolute", "prismatic", "spherical"]);
+            last = body(&mut rng, &mut text, joint, Some(&last));
+        }
+        let kind = rng.below(2);
+        text += &shape(&mut rng, &format!("foot{leg}"), Some(&last), kind);
+        text += &format!("[[contact]]\nname = \"sole{leg}\"\nbetween = [\"floor\", \"foot{leg}\"]\nfriction = 0.7\n");
+    }
+    read::model("legged.toml", &text, &Default::default()).unwrap_or_else(|e| panic!("{e}\n{text}")).model
+}

@@ -5,6 +5,7 @@ mod bitwise;
 mod c;
 mod constrained;
 mod counts;
+mod early_contacts;
 mod eliminations;
 mod emitted;
 mod external;

@@ -152,7 +152,7 @@ fn many_thrown_quadrupeds_land() {
 /// the shortest jam has no impulses.
 #[test]
 fn events_that_crowd_come_to_an_end() {
-    for (seed, time, tolerance) in [(114, 0.04, 1e-7), (134, 0.05, 1e-7)] {
+    for (seed, time, tolerance) in [(114, 0.04, 1e-7), (198, 0.05, 1e-7)] {
         let mut scene = thrown(include_str!("../../../models/contacts/quadruped_hop.toml"), seed);
         scene.tolerance = tolerance;
         scene.start();

@@ -153,7 +153,7 @@ fn plain_trees_move_as_others_do() {
         if tree.is_plain() {
             plain += 1;
             // This is why all sweeps of one direction may visit a node together.
-            assert!(passes(&SweepList::<f64, (), 13>::RATES.sweeps, &tree).len() <= 2, "seed {seed}");
+            assert!(passes(&SweepList::<f64, (), 14>::RATES.sweeps, &tree).len() <= 2, "seed {seed}");
         }
         for ((what, a), (_, b)) in results(&one, &s).iter().zip(&results(&other, &still)) {
             assert_eq!(a, b, "seed {seed}: {what}\n{}", to_toml(&model));

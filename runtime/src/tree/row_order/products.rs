@@ -89,6 +89,11 @@ impl RowProducts {
         }
     }
 
+    /// Whether a row is zero, next to the others.
+    pub(super) fn is_zero(&self, r: usize) -> bool {
+        self.full[r] <= NOTHING * NOTHING * self.full.iter().fold(0.0_f64, |most, x| most.max(*x))
+    }
+
     pub(super) fn eliminate(&mut self, r: usize) {
         if self.whole[r] > 0.0 && self.left(r) > NOTHING {
             self.take_off(r);

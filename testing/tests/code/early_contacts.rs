@@ -1,0 +1,251 @@
+//! Rows of feet that stand on the ground are solved where their legs begin: what functions for sets of modes and pieces
+//! then compute, what it costs, and what they tell where a leg cannot follow its foot.
+
+use mbd_codegen::factored::{factored, FactoredProgram};
+use mbd_codegen::generate::{trace, Arithmetic, Options, Output, RolledCode};
+use mbd_codegen::jit::Compiled;
+use mbd_codegen::model::Model;
+use mbd_codegen::modes::words;
+use mbd_codegen::options::PlanOptions;
+use mbd_codegen::plan::Plan;
+use mbd_codegen::search;
+use mbd_runtime::contact::{rows_that_act, Mode, Reducible};
+use mbd_runtime::{Constrained, System};
+use mbd_testing::random::{legged, with_contacts, Rng};
+use mbd_testing::state::{random_state, State};
+
+const OUTPUTS: [Output; 3] = [Output::Rates, Output::ProjectMomenta, Output::Multipliers];
+
+fn fast() -> Options {
+    let mut options = Options { arithmetic: Arithmetic::Fast, ..Options::default() };
+    options.plan.rolled = RolledCode::Never;
+    options
+}
+
+fn shipped(name: &str) -> Model {
+    let path = format!("{}/../models/contacts/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    Model::load(path).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The plan in a set of modes.
+fn acting(full: &Plan, modes: &[Mode]) -> Plan {
+    full.acting(&rows_that_act(full.dims.rows, &full.contacts::<f64>(), modes))
+}
+
+/// What the interpreter computes, which solves all rows at the ground.
+fn interpreted(full: &Plan, modes: &[Mode], state: &State, output: Output) -> Vec<f64> {
+    let acts = rows_that_act(full.dims.rows, &full.contacts::<f64>(), modes);
+    let mut interpreter = state.interpreter_acting(full, &acts);
+    let (mut v, mut qd) = (vec![0.0; full.dims.nv], vec![0.0; full.dims.nq]);
+    let (mut pd, mut rows) = (momenta(state), vec![0.0; full.dims.rows]);
+    match output {
+        Output::Rates => {
+            interpreter.rates(&state.q, &momenta(state), &mut v, &mut qd, &mut pd);
+            [qd, pd].concat()
+        }
+        Output::ProjectMomenta => {
+            interpreter.project_momenta(0.0, &state.q, &mut pd, &mut v, &mut rows);
+            [v, pd, rows].concat()
+        }
+        _ => {
+            interpreter.multipliers(0.0, &state.q, &state.v, &mut rows);
+            rows
+        }
+    }
+}
+
+/// The same by machine code of the plan in which the rows act, through the traits that motions use.
+fn compiled(machine: &mut Compiled<f64>, state: &State, output: Output) -> Vec<f64> {
+    let (nq, nv) = (state.q.len(), state.v.len());
+    let (mut qd, mut v, mut p, mut rows) = (vec![0.0; nq], vec![0.0; nv], momenta(state), machine.zero_rows());
+    match output {
+        Output::Rates => {
+            machine.rates_at(0.0, &state.q, &momenta(state), &mut qd, &mut p);
+            [qd, p].concat()
+        }
+        Output::ProjectMomenta => {
+            machine.project_momenta(0.0, &state.q, &mut p, &mut v, &mut rows);
+            [v, p, rows].concat()
+        }
+        _ => {
+            machine.multipliers(0.0, &state.q, &state.v, &mut rows);
+            rows
+        }
+    }
+}
+
+fn momenta(state: &State) -> Vec<f64> {
+    state.v.iter().map(|v| 0.7 * v - 0.1).collect()
+}
+
+/// The largest difference, as a part of the largest number.
+fn error(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    let largest = b.iter().fold(1e-300_f64, |most, x| most.max(x.abs()));
+    a.iter().zip(b).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs() / largest))
+}
+
+/// Results in a set of modes with early rows, by a function of its own and in pieces, each with whether all early rows
+/// act; `None` where no rows are early.
+fn early(
+    full: &Plan,
+    pieces: &FactoredProgram,
+    modes: &[Mode],
+    state: &State,
+    output: Output,
+) -> Option<[(Vec<f64>, bool); 2]> {
+    let plan = acting(full, modes);
+    let contacts = plan.early_contacts();
+    if contacts.is_empty() {
+        return None;
+    }
+    let fused = |a: f64, b: f64, c: f64| a.mul_add(b, c);
+    let second = if output == Output::Multipliers { state.v.clone() } else { momenta(state) };
+    let own = trace(&plan.with_early_contacts(&contacts), output, &fast()).unwrap_or_else(|e| panic!("{e}"));
+    let given = state.inputs_of(&own.inputs, &second, &[]);
+    let mut result = own.program.evaluate(&given, fused);
+    let act = result.pop().expect("whether early rows act");
+    assert!(act == 0.0 || (act - 1.0).abs() < 1e-12, "{act}");
+    // Which rows act is an input of pieces that no operation reads.
+    let first = pieces.choose(modes).expect("modes of the model");
+    let choice = pieces.with_late(&first, &given, fused);
+    Some([(result, act != 0.0), (pieces.evaluate(&choice, &given, fused), choice == first)])
+}
+
+/// Compares random states in random sets of modes. Gives how many results had early rows that acted, and how many had some
+/// that did not.
+fn compare(what: &str, plan: &Plan, output: Output, count: usize, seed: u64) -> [usize; 2] {
+    let (model, full) = (&plan.model, plan.with_contacts());
+    let Some(pieces) = factored(&full, output, &fast()) else { return [0; 2] };
+    let mut rng = Rng::new(seed, 5);
+    let mut counts = [0; 2];
+    for k in 0..count {
+        let each = model.contacts.iter().map(|contact| match contact.friction > 0.0 {
+            true => rng.pick(&[Mode::Open, Mode::Slide, Mode::Stick, Mode::Stick]),
+            false => rng.pick(&[Mode::Open, Mode::Open, Mode::Slide]),
+        });
+        let modes: Vec<Mode> = each.collect();
+        let state = random_state(&full, seed + 1000 * k as u64);
+        let Some(results) = early(&full, &pieces.program, &modes, &state, output) else { continue };
+        let expected = interpreted(&full, &modes, &state, output);
+        for (way, (result, act)) in ["by its own function", "in pieces"].into_iter().zip(results) {
+            counts[usize::from(!act)] += 1;
+            // Where early rows do not act, pieces have taken the late ones, and a function leaves it to the one for all modes.
+            if act || way == "in pieces" {
+                let (name, words, error) = (output.name(), words(&modes), error(&result, &expected));
+                assert!(error < 1e-9, "{what}, {name} in `{words}` {way}: {error:e}");
+            }
+        }
+    }
+    counts
+}
+
+#[test]
+fn early_rows_bind_as_rows_at_the_ground_do() {
+    let mut sum = [0; 2];
+    for (k, output) in OUTPUTS.into_iter().enumerate() {
+        for name in ["quadruped", "quadruped_hop"] {
+            // With eliminations that are searched for, which are others for accelerations, and with one joint at a time.
+            let model = shipped(name);
+            for plan in [search::plan(&model, PlanOptions::default()), Plan::new(&model, 1e-9)] {
+                let counts = compare(name, &plan, output, 8, 7 + k as u64);
+                sum = [sum[0] + counts[0], sum[1] + counts[1]];
+            }
+        }
+    }
+    println!("{} times all early rows acted, {} times not", sum[0], sum[1]);
+    assert!(sum[0] > 100, "{sum:?}");
+}
+
+#[test]
+fn early_rows_of_random_robots_bind_as_rows_at_the_ground_do() {
+    let mut sum = [0; 2];
+    for seed in 0..30 {
+        let plan = Plan::new(&legged(seed), 1e-9);
+        let counts = compare(&format!("seed {seed}"), &plan, OUTPUTS[seed as usize % 3], 4, seed);
+        sum = [sum[0] + counts[0], sum[1] + counts[1]];
+    }
+    println!("{} times all early rows acted, {} times not", sum[0], sum[1]);
+    assert!(sum[0] > 100, "{sum:?}");
+}
+
+#[test]
+fn early_rows_of_random_mechanisms_bind_as_rows_at_the_ground_do() {
+    for seed in 0..40 {
+        // More contacts on one limb have thousands of modes, each of which is traced.
+        if let Some(model) = with_contacts(seed).filter(|model| model.contacts.len() <= 3) {
+            compare(&format!("seed {seed}"), &Plan::new(&model, 1e-9), OUTPUTS[seed as usize % 3], 3, seed);
+        }
+    }
+}
+
+#[test]
+fn a_straight_leg_leaves_its_foot_to_late_rows() {
+    let model = shipped("quadruped_hop");
+    let full = Plan::new(&model, 1e-9).with_contacts();
+    let modes = [Mode::Stick, Mode::Open, Mode::Stick, Mode::Open];
+    let at = |joint: &str| full.coordinate_names().iter().position(|name| name == joint).expect("a joint");
+    let knee = at("knee_fl");
+    for output in OUTPUTS {
+        let pieces = factored(&full, output, &fast()).expect("limbs").program;
+        let mut state = random_state(&full, 3);
+        let acts = rows_that_act(full.dims.rows, &full.contacts::<f64>(), &modes);
+        let machine = Compiled::<f64>::from_plan(full.clone(), fast().of_model(true)).expect("options");
+        let mut machine = machine.acting(&acts);
+        machine.inputs().tau.clone_from(&state.tau);
+        let mut straight = 0;
+        // The contact point, hip and knee are in line where the knee is bent a little, by where the ball of the foot touches.
+        for k in -100..=100 {
+            state.q[knee] = 3e-3 * f64::from(k);
+            let [own, in_pieces] = early(&full, &pieces, &modes, &state, output).expect("early rows");
+            assert_eq!(own.1, in_pieces.1, "{} at {}", output.name(), state.q[knee]);
+            let expected = interpreted(&full, &modes, &state, output);
+            straight += usize::from(!own.1);
+            for (result, act) in [(&in_pieces.0, true), (&own.0, own.1)] {
+                let error = error(result, &expected);
+                assert!(!act || error < 1e-10, "{} at {}: {error:e}", output.name(), state.q[knee]);
+            }
+            // Machine code made at run time: where early rows do not act the interpreter first, and code without them later.
+            let often = if own.1 { 1 } else { Compiled::<f64>::WORTHWHILE / 30 };
+            for _ in 0..often {
+                let error = error(&compiled(&mut machine, &state, output), &expected);
+                assert!(error < 1e-10, "{} at {} in machine code: {error:e}", output.name(), state.q[knee]);
+            }
+        }
+        println!("{}: a foot is left to late rows in {straight} of 201 positions", output.name());
+        assert!((1..70).contains(&straight), "{straight}");
+    }
+}
+
+#[test]
+fn a_leg_at_a_stop_has_no_early_rows() {
+    let model = shipped("quadruped");
+    let full = Plan::new(&model, 1e-9).with_contacts();
+    let mut modes = vec![Mode::Open; model.contacts.len()];
+    let contact = |name: &str| model.contacts.iter().position(|c| c.name == name).expect("a contact");
+    (modes[contact("sole_fl")], modes[contact("sole_hr")]) = (Mode::Stick, Mode::Stick);
+    assert_eq!(acting(&full, &modes).early_contacts(), [contact("sole_fl"), contact("sole_hr")]);
+    modes[contact("knee_hr/upper")] = Mode::Slide;
+    assert_eq!(acting(&full, &modes).early_contacts(), [contact("sole_fl")]);
+    // A foot that slides has one row, which hip and thigh can follow.
+    (modes[contact("sole_hr")], modes[contact("sole_hl")]) = (Mode::Slide, Mode::Slide);
+    assert_eq!(acting(&full, &modes).early_contacts().len(), 3);
+}
+
+#[test]
+fn three_feet_of_a_quadruped_cost_less_than_another_flight() {
+    let full = Plan::new(&shipped("quadruped"), 1e-9).with_contacts();
+    let pieces = factored(&full, Output::Rates, &fast()).expect("limbs").program;
+    let exact = Options { arithmetic: Arithmetic::Exact, ..fast() };
+    let late = factored(&full, Output::Rates, &exact).expect("limbs").program;
+    let count = |pieces: &FactoredProgram, feet: usize| {
+        let mut modes = vec![Mode::Open; full.model.contacts.len()];
+        modes[..feet].fill(Mode::Stick);
+        pieces.counts_of(&pieces.choose(&modes).expect("modes of the model")).total()
+    };
+    let counts: Vec<[usize; 2]> = (0..=4).map(|feet| [count(&pieces, feet), count(&late, feet)]).collect();
+    println!("operations of early and late rows with 0 to 4 feet: {counts:?}");
+    assert!(counts[3][0] < 175 * counts[0][0] / 100, "{counts:?}");
+    assert!(counts[4][0] < 70 * counts[4][1] / 100, "{counts:?}");
+    println!("of all pieces: {} {}", pieces.counts().total(), late.counts().total());
+}
