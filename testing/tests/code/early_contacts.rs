@@ -144,34 +144,33 @@ fn compare(what: &str, plan: &Plan, output: Output, count: usize, seed: u64) -> 
 fn early_rows_bind_as_rows_at_the_ground_do() {
     let mut sum = [0; 2];
     for (k, output) in OUTPUTS.into_iter().enumerate() {
-        for name in ["quadruped", "quadruped_hop"] {
-            // With eliminations that are searched for, which are others for accelerations, and with one joint at a time.
-            let model = shipped(name);
-            for plan in [search::plan(&model, PlanOptions::default()), Plan::new(&model, 1e-9)] {
-                let counts = compare(name, &plan, output, 8, 7 + k as u64);
-                sum = [sum[0] + counts[0], sum[1] + counts[1]];
-            }
+        // With eliminations that are searched for, which are others for accelerations, and with one joint at a time.
+        let searched = search::plan(&shipped("quadruped"), PlanOptions::default());
+        let plain = Plan::new(&shipped("quadruped_hop"), 1e-9);
+        for plan in [searched, plain] {
+            let counts = compare(&plan.model.name, &plan, output, 12, 7 + k as u64);
+            sum = [sum[0] + counts[0], sum[1] + counts[1]];
         }
     }
     println!("{} times all early rows acted, {} times not", sum[0], sum[1]);
-    assert!(sum[0] > 100, "{sum:?}");
+    assert!(sum[0] > 50, "{sum:?}");
 }
 
 #[test]
 fn early_rows_of_random_robots_bind_as_rows_at_the_ground_do() {
     let mut sum = [0; 2];
-    for seed in 0..30 {
+    for seed in 0..18 {
         let plan = Plan::new(&legged(seed), 1e-9);
         let counts = compare(&format!("seed {seed}"), &plan, OUTPUTS[seed as usize % 3], 4, seed);
         sum = [sum[0] + counts[0], sum[1] + counts[1]];
     }
     println!("{} times all early rows acted, {} times not", sum[0], sum[1]);
-    assert!(sum[0] > 100, "{sum:?}");
+    assert!(sum[0] > 50, "{sum:?}");
 }
 
 #[test]
 fn early_rows_of_random_mechanisms_bind_as_rows_at_the_ground_do() {
-    for seed in 0..40 {
+    for seed in 0..20 {
         // More contacts on one limb have thousands of modes, each of which is traced.
         if let Some(model) = with_contacts(seed).filter(|model| model.contacts.len() <= 3) {
             compare(&format!("seed {seed}"), &Plan::new(&model, 1e-9), OUTPUTS[seed as usize % 3], 3, seed);
