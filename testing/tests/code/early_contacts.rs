@@ -10,7 +10,7 @@ use mbd_codegen::options::PlanOptions;
 use mbd_codegen::plan::Plan;
 use mbd_codegen::search;
 use mbd_runtime::contact::{rows_that_act, Mode, Reducible};
-use mbd_runtime::{Constrained, System};
+use mbd_runtime::Constrained;
 use mbd_testing::random::{legged, with_contacts, Rng};
 use mbd_testing::state::{random_state, State};
 
@@ -32,46 +32,33 @@ fn acting(full: &Plan, modes: &[Mode]) -> Plan {
     full.acting(&rows_that_act(full.dims.rows, &full.contacts::<f64>(), modes))
 }
 
-/// What the interpreter computes, which solves all rows at the ground.
-fn interpreted(full: &Plan, modes: &[Mode], state: &State, output: Output) -> Vec<f64> {
-    let acts = rows_that_act(full.dims.rows, &full.contacts::<f64>(), modes);
-    let mut interpreter = state.interpreter_acting(full, &acts);
-    let (mut v, mut qd) = (vec![0.0; full.dims.nv], vec![0.0; full.dims.nq]);
-    let (mut pd, mut rows) = (momenta(state), vec![0.0; full.dims.rows]);
+/// What a system computes, through the traits that motions use.
+fn computed<Y>(system: &mut Y, state: &State, output: Output) -> Vec<f64>
+where
+    Y: Constrained<Scalar = f64, Coordinates = Vec<f64>, Momenta = Vec<f64>, Rows = Vec<f64>>,
+{
+    let (mut qd, mut v) = (vec![0.0; state.q.len()], vec![0.0; state.v.len()]);
+    let (mut p, mut rows) = (momenta(state), system.zero_rows());
     match output {
         Output::Rates => {
-            interpreter.rates(&state.q, &momenta(state), &mut v, &mut qd, &mut pd);
-            [qd, pd].concat()
+            system.rates_at(0.0, &state.q, &momenta(state), &mut qd, &mut p);
+            [qd, p].concat()
         }
         Output::ProjectMomenta => {
-            interpreter.project_momenta(0.0, &state.q, &mut pd, &mut v, &mut rows);
-            [v, pd, rows].concat()
+            system.project_momenta(0.0, &state.q, &mut p, &mut v, &mut rows);
+            [v, p, rows].concat()
         }
         _ => {
-            interpreter.multipliers(0.0, &state.q, &state.v, &mut rows);
+            system.multipliers(0.0, &state.q, &state.v, &mut rows);
             rows
         }
     }
 }
 
-/// The same by machine code of the plan in which the rows act, through the traits that motions use.
-fn compiled(machine: &mut Compiled<f64>, state: &State, output: Output) -> Vec<f64> {
-    let (nq, nv) = (state.q.len(), state.v.len());
-    let (mut qd, mut v, mut p, mut rows) = (vec![0.0; nq], vec![0.0; nv], momenta(state), machine.zero_rows());
-    match output {
-        Output::Rates => {
-            machine.rates_at(0.0, &state.q, &momenta(state), &mut qd, &mut p);
-            [qd, p].concat()
-        }
-        Output::ProjectMomenta => {
-            machine.project_momenta(0.0, &state.q, &mut p, &mut v, &mut rows);
-            [v, p, rows].concat()
-        }
-        _ => {
-            machine.multipliers(0.0, &state.q, &state.v, &mut rows);
-            rows
-        }
-    }
+/// What the interpreter computes, which solves all rows at the ground.
+fn interpreted(full: &Plan, modes: &[Mode], state: &State, output: Output) -> Vec<f64> {
+    let acts = rows_that_act(full.dims.rows, &full.contacts::<f64>(), modes);
+    computed(&mut state.interpreter_acting(full, &acts), state, output)
 }
 
 fn momenta(state: &State) -> Vec<f64> {
@@ -207,7 +194,7 @@ fn a_straight_leg_leaves_its_foot_to_late_rows() {
             // Machine code made at run time: where early rows do not act the interpreter first, and code without them later.
             let often = if own.1 { 1 } else { Compiled::<f64>::WORTHWHILE / 30 };
             for _ in 0..often {
-                let error = error(&compiled(&mut machine, &state, output), &expected);
+                let error = error(&computed(&mut machine, &state, output), &expected);
                 assert!(error < 1e-10, "{} at {} in machine code: {error:e}", output.name(), state.q[knee]);
             }
         }
