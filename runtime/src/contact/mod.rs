@@ -40,7 +40,6 @@ pub use touching::{Reach, Touching};
 pub use with_contacts::WithContacts;
 
 /// Number of contacts up to which all gaps are computed at once: finding out which are far takes as long.
-#[cfg(any(feature = "alloc", feature = "hulls"))]
 const FEW: usize = 8;
 
 /// How a contact with restitution throws its bodies apart.

@@ -84,7 +84,7 @@ struct Departure<S> {
 /// cut there, impulses and modes are computed, and the motion starts again. A gap counts as zero where it touches zero
 /// within a step too, which its rate tells. While all contacts are open, gaps are not looked at before the joints have
 /// moved so far that one of them may have closed ([`Touching::reaches`]). Of many contacts, those that are far by the same
-/// measure are not computed where a mechanism can do without ([`Touching::sees_parts`]), whether others are closed or not.
+/// measure are not asked for ([`Touching::gaps_of`]), whether others are closed or not.
 ///
 /// While contacts are closed, momenta collect their multipliers. Events free them of these, so that a contact that opens does not
 /// make velocities of them; between events, a state's momenta and energy contain them unless the method projects
