@@ -88,6 +88,8 @@ pub(super) fn partners(n: usize, pairs: impl Iterator<Item = [usize; 2]>) -> Vec
 
 /// A chain of fewer nodes carries the rows at its end to the ground.
 const LONG_CHAIN: usize = 30;
+/// A body on the ground's joint of fewer freedoms is no trunk of an only leg, but a link of it.
+const FREEDOMS_OF_TRUNK: usize = 3;
 
 /// Rows of loops between the ground and a leg of a trunk, and the node after whose freedoms they are solved.
 fn rows_of_trunks(plan: &Plan) -> Vec<(usize, usize)> {
@@ -97,7 +99,7 @@ fn rows_of_trunks(plan: &Plan) -> Vec<(usize, usize)> {
 }
 
 /// The node at which the leg of a trunk begins that a constraint binds to the ground; for a long chain without branches, the
-/// node before its outer third.
+/// node before its outer third. A body that floats is the trunk of its only leg, too.
 fn leg_of(plan: &Plan, constraint: &PlanConstraint) -> Option<usize> {
     let PlanBond::Cut { frames, .. } = &constraint.bond else { return None };
     let ([None, Some(foot)] | [Some(foot), None]) = [frames[0].node, frames[1].node] else { return None };
@@ -106,7 +108,11 @@ fn leg_of(plan: &Plan, constraint: &PlanConstraint) -> Option<usize> {
     let way = plan.ancestors(foot);
     let begins = |i: &usize| plan.nodes[*i].parent.is_some_and(|trunk| children[trunk] > 1);
     let third = (way.len() >= LONG_CHAIN).then(|| way[way.len() / 3 - 1]);
-    let first = way.iter().copied().find(begins).or(third)?;
+    let only = match way[..] {
+        [.., first, trunk] if plan.nodes[trunk].kind.nv() >= FREEDOMS_OF_TRUNK => Some(first),
+        _ => None,
+    };
+    let first = way.iter().copied().find(begins).or(third).or(only)?;
     // Freedoms that are solved at inner nodes must have been solved there, too.
     let leg = way.iter().position(|&i| i == first).map_or(&[][..], |k| &way[..=k]);
     let solved = |i: &usize| {

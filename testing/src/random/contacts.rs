@@ -61,7 +61,7 @@ pub fn with_contacts(seed: u64) -> Option<Model> {
         .filter(|m| !m.contacts.is_empty())
 }
 
-/// A random robot: a floating trunk with two to four legs of two to five joints, with a foot on each that touches one floor.
+/// A random robot: a floating trunk with one to four legs of two to five joints, with a foot on each that touches one floor.
 pub fn legged(seed: u64) -> Model {
     let mut rng = Rng::new(seed, 73);
     let mut text = String::from("name = \"legged\"\n[[shape]]\nname = \"floor\"\ntype = \"plane\"\n");
@@ -79,7 +79,7 @@ pub fn legged(seed: u64) -> Model {
         name
     };
     let trunk = body(&mut rng, &mut text, "floating", None);
-    for leg in 0..2 + rng.below(3) {
+    for leg in 0..1 + rng.below(4) {
         let mut last = trunk.clone();
         for _ in 0..2 + rng.below(4) {
             let joint = rng.pick(&["revolute", "revolute", "revolute", "prismatic", "spherical"]);

@@ -219,6 +219,29 @@ fn a_leg_at_a_stop_has_no_early_rows() {
 }
 
 #[test]
+fn a_robot_with_one_leg_has_early_rows() {
+    let mut count = 0;
+    for seed in 0..40 {
+        let plan = Plan::new(&legged(seed), 1e-9);
+        if plan.model.contacts.len() > 1 {
+            continue;
+        }
+        // Those of the first seeds are compared with the interpreter above.
+        assert!(factored(&plan.with_contacts(), Output::Rates, &fast()).is_some(), "seed {seed}");
+        let on_foot = acting(&plan.with_contacts(), &[Mode::Stick]);
+        let early = on_foot.with_early_contacts(&on_foot.early_contacts());
+        let operations = |plan: &Plan| {
+            trace(plan, Output::Rates, &fast()).unwrap_or_else(|e| panic!("{e}")).program.counts().total()
+        };
+        let [with, without] = [&early, &on_foot].map(operations);
+        println!("seed {seed}: {with} operations in place of {without}");
+        assert!(20 * with < 18 * without, "seed {seed}: {with} {without}");
+        count += 1;
+    }
+    assert!(count > 5, "{count}");
+}
+
+#[test]
 fn three_feet_of_a_quadruped_cost_less_than_another_flight() {
     let full = Plan::new(&shipped("quadruped"), 1e-9).with_contacts();
     let pieces = factored(&full, Output::Rates, &fast()).expect("limbs").program;
