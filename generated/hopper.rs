@@ -2352,7 +2352,7 @@ impl ::multibody::runtime::Constrained for Hopper {
 #[rustfmt::skip]
 impl ::multibody::runtime::contact::Touching for Hopper {
     type PerContact<T: Copy + ::core::fmt::Debug> = [T; 3];
-    type Delassus = [f64; 65];
+    type Delassus = [f64; 70];
 
     #[inline]
     fn contacts(&self) -> &[::multibody::runtime::contact::Contact<f64>] {
@@ -2365,8 +2365,8 @@ impl ::multibody::runtime::contact::Touching for Hopper {
     }
 
     #[inline]
-    fn zero_delassus(&self, _len: usize) -> [f64; 65] {
-        [0.0; 65]
+    fn zero_delassus(&self, _len: usize) -> [f64; 70] {
+        [0.0; 70]
     }
 
     #[inline]

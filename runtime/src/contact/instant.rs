@@ -1,7 +1,7 @@
 //! Impulses, or forces, of contacts at an instant: the problem and the memory for its solution.
 
 use super::assembly::{lines, symmetrize, Forces};
-use super::solver::{eliminate, solve_near};
+use super::solver::{factor, solve_factored, solve_near};
 use super::{solve, Certificate, Contact, ContactError, Effort, Mode, Problem, Touch, Touching, WithContacts};
 use crate::lists::{copy, first, first_mut, get, get_or, set, split};
 use crate::Scalar;
@@ -199,8 +199,7 @@ impl<Y: Touching> Touches<Y> {
         system.responses((t, q), shared, (self.open.as_ref(), false), a, self.own.as_mut());
         system.response_to_multipliers((t, q), shared, self.b.as_mut());
         system.restore();
-        self.impulses.as_mut().fill(Y::Scalar::zero());
-        (0..PASSES).all(|_| self.share_again(n))
+        self.share_forces(n)
     }
 
     /// The contacts that share a load, for [`lines`].
@@ -208,33 +207,40 @@ impl<Y: Touching> Touches<Y> {
         Forces { contacts: self.order(), touches: Some(first(self.problem.as_ref(), self.count)) }
     }
 
-    /// Improves the `n` forces of [`Touches::share`].
-    fn share_again(&mut self, n: usize) -> bool {
+    /// The `n` forces of [`Touches::share`] from `a`, `own` and `b`.
+    fn share_forces(&mut self, n: usize) -> bool {
         let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
         let more = Y::Scalar::constant(COMPLIANCE);
         let (matrix, rest) = split(self.work.as_mut(), n * n);
-        let rhs = first_mut(rest, n);
-        let forces = first_mut(self.impulses.as_mut(), n);
-        let width = n.max(1);
-        let own = self.own.as_ref().iter().zip(self.b.as_ref()).zip(self.a.as_ref().chunks_exact(width));
-        let lines = matrix.chunks_exact_mut(width).zip(rhs.iter_mut().zip(forces.iter()));
-        for (row, ((line, (rhs, force)), ((&own, b), a))) in lines.zip(own).enumerate() {
+        let (rhs, rest) = split(rest, n);
+        let exchanged = first_mut(rest, n);
+        let own = first(self.own.as_ref(), n);
+        let lines = matrix.chunks_exact_mut(n.max(1)).zip(self.a.as_ref().chunks_exact(n.max(1)));
+        for (row, ((line, a), &own)) in lines.zip(own).enumerate() {
             line.fill(zero);
             // What cannot move has no force.
             set(line, row, one);
-            *rhs = zero;
             if own > zero {
                 for (x, a) in line.iter_mut().zip(a) {
                     *x = *a / own;
                 }
                 let held = get(line, row) + more;
                 set(line, row, held);
-                *rhs = more * *force - *b / own;
             }
         }
-        let found = eliminate(matrix, rhs);
-        copy(forces, rhs);
-        found
+        if !factor(matrix, exchanged) {
+            return false;
+        }
+        let forces = first_mut(self.impulses.as_mut(), n);
+        forces.fill(zero);
+        (0..PASSES).all(|_| {
+            for (rhs, ((&own, b), force)) in rhs.iter_mut().zip(own.iter().zip(self.b.as_ref()).zip(forces.iter())) {
+                *rhs = if own > zero { more * *force - *b / own } else { zero };
+            }
+            let found = solve_factored(matrix, exchanged, rhs);
+            copy(forces, rhs);
+            found
+        })
     }
 
     /// Acceleration of a row with the forces in `impulses`, after [`Touches::find_forces`], or velocity with the impulses there.

@@ -22,7 +22,7 @@ use super::Contact;
 use crate::lists::{copy, get, part, set, split};
 use crate::system::Real;
 
-pub(super) use newton::eliminate;
+pub(super) use newton::{factor, solve_factored};
 use search::{improve, iterate, sweep, swept, Progress, LENGTHS, NEAR, STEPS};
 
 pub use impact::{impact, Impact, ImpactOptions, ImpactOrder};
@@ -157,7 +157,7 @@ impl core::error::Error for ContactError {}
 
 /// Room that [`solve`] and [`impact`] need for a problem with some number of rows.
 pub const fn work_len(rows: usize) -> usize {
-    rows * rows + 8 * rows
+    rows * rows + 9 * rows
 }
 
 /// Computes the impulses of a problem; `impulses` has a number for each row, the start of the iteration and its result,

@@ -9,13 +9,14 @@ use crate::system::Real;
 const PROXIMAL: f64 = 1e-10;
 
 /// Takes a full step: contacts whose bodies part lose their impulses, and the equations of the others are linear ones in
-/// theirs. `false` where these are singular. `work` begins with the velocities of the impulses, and has room for two more lists
-/// and a square matrix.
+/// theirs. `false` where these are singular. `work` begins with the velocities of the impulses, and has room for three more
+/// lists and a square matrix.
 pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], work: &mut [S]) -> bool {
     let n = impulses.len();
     let (v, rest) = split(work, n);
     let (acts, rest) = split(rest, n);
-    let (step, matrix) = split(rest, n);
+    let (step, rest) = split(rest, n);
+    let (exchanged, matrix) = split(rest, n);
     let mut count = 0;
     for touch in terms.problem.touches {
         let c = touch.contact;
@@ -48,7 +49,8 @@ pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], work: &mut [S]
         equations(terms, (touch, at), all, (impulses, v), lines, rhs);
         at += rows;
     }
-    if !eliminate(matrix, step) {
+    let exchanged = first_mut(exchanged, count);
+    if !(factor(matrix, exchanged) && solve_factored(matrix, exchanged, step)) {
         return false;
     }
     let mut steps = step.iter();
@@ -158,9 +160,10 @@ pub(super) fn differentiate<S: Real>(terms: &Terms<S>, impulses: &mut [S], work:
     })
 }
 
-/// Solves `matrix x = rhs` in place by Gaussian elimination with partial pivoting; `false` where a pivot is zero.
-pub(in crate::contact) fn eliminate<S: Real>(matrix: &mut [S], rhs: &mut [S]) -> bool {
-    let n = rhs.len();
+/// Factors a square matrix of `exchanged.len()` rows in place, by Gaussian elimination with partial pivoting: `L` below the
+/// diagonal, `U` on it and above; for each row, the later row with which it was exchanged. `false` where a pivot is zero.
+pub(in crate::contact) fn factor<S: Real>(matrix: &mut [S], exchanged: &mut [S]) -> bool {
+    let n = exchanged.len();
     for k in 0..n {
         let size = |i: usize| get(matrix, i * n + k).abs();
         let mut best = k;
@@ -172,17 +175,17 @@ pub(in crate::contact) fn eliminate<S: Real>(matrix: &mut [S], rhs: &mut [S]) ->
         if !(size(best) > S::zero()) {
             return false;
         }
+        set(exchanged, k, S::from_index(best));
         if best != k {
             let (above, below) = split(matrix, best * n);
             swap(part_mut(above, k * n, n), first_mut(below, n));
-            let (above, below) = split(rhs, best);
-            swap(part_mut(above, k, 1), first_mut(below, 1));
         }
         let (above, below) = split(matrix, (k + 1) * n);
         let line = part(above, k * n, n);
-        let (pivot, own) = (get(line, k), get(rhs, k));
-        for (other, rhs) in below.chunks_exact_mut(n).zip(rhs.iter_mut().skip(k + 1)) {
+        let pivot = get(line, k);
+        for other in below.chunks_exact_mut(n) {
             let factor = get(other, k) / pivot;
+            set(other, k, factor);
             // Rows of contacts that are open have one entry.
             if factor == S::zero() && factor.derivative().is_none() {
                 continue;
@@ -191,11 +194,27 @@ pub(in crate::contact) fn eliminate<S: Real>(matrix: &mut [S], rhs: &mut [S]) ->
             for (x, by) in part_mut(other, k + 1, right).iter_mut().zip(part(line, k + 1, right)) {
                 *x = *x - factor * *by;
             }
-            *rhs = *rhs - factor * own;
+        }
+    }
+    true
+}
+
+/// Solves `matrix x = rhs` in place with the factors of [`factor`]; `false` where `x` is not finite.
+pub(in crate::contact) fn solve_factored<S: Real>(factors: &[S], exchanged: &[S], rhs: &mut [S]) -> bool {
+    let n = rhs.len();
+    for (k, other) in exchanged.iter().enumerate() {
+        let (above, below) = split(rhs, other.index());
+        swap(part_mut(above, k, 1), first_mut(below, 1));
+    }
+    for k in 0..n {
+        let (above, below) = split(rhs, k + 1);
+        let own = get(above, k);
+        for (rhs, line) in below.iter_mut().zip(factors.chunks_exact(n).skip(k + 1)) {
+            *rhs = *rhs - get(line, k) * own;
         }
     }
     for k in (0..n).rev() {
-        let line = part(matrix, k * n, n);
+        let line = part(factors, k * n, n);
         let known = line.iter().zip(rhs.iter()).skip(k + 1);
         let sum = known.fold(get(rhs, k), |sum, (a, x)| sum - *a * *x);
         set(rhs, k, sum / get(line, k));

@@ -161,7 +161,7 @@ fn elsewhere<S: Real>(
 }
 
 /// Steps of Newton's method, until the residual is below a tolerance; whether it is. With several `lengths`, until a step does
-/// not reduce it either, which is not made; with one, all are full steps. `work` has room for a square matrix and four lists.
+/// not reduce it either, which is not made; with one, all are full steps. `work` has room for a square matrix and five lists.
 pub(super) fn improve<S: Real>(
     terms: &Terms<S>,
     tolerance: f64,

@@ -180,7 +180,9 @@ impl<Y: Touching> WithContacts<Y> {
     /// [`WithContacts::loads`] where contacts that slide share a load; `false` where no forces are found.
     fn share(&mut self, t: Y::Scalar, q: &Y::Coordinates) -> bool {
         let Some(mut instant) = self.instant.take() else { return false };
-        self.near = false; // Its forces are those of other lines.
+        // Its forces are those of other lines. Contacts that share a load have many solutions, too, of which a search that
+        // starts near the last one finds others at the same state: steps that see them are rejected.
+        self.near = false;
         let found = instant.share(self, t, q);
         if found {
             let zero = Y::Scalar::zero();
