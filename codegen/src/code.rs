@@ -157,11 +157,7 @@ impl Programs {
         let (contacts, rows) = (full.contacts::<f64>(), full.dims.rows);
         let with_early = |full: &Plan, acts: &[bool]| {
             let plan = full.acting(acts);
-            match options.arithmetic {
-                // Functions have the bits of those for all modes, whose rows are not early.
-                Arithmetic::Exact => plan,
-                Arithmetic::Fast => plan.with_early_contacts(&plan.early_contacts()),
-            }
+            plan.with_early_contacts(&plan.early_contacts(options.arithmetic))
         };
         for modes in sets {
             let acts = rows_that_act(rows, &contacts, &modes);

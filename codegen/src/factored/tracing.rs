@@ -108,10 +108,7 @@ impl<'g, 'a> Tracing<'g, 'a> {
         if limbs.len() > 64 || limbs.iter().map(|limb| limb.modes.len()).sum::<usize>() > MOST_LIMB_MODES {
             return None;
         }
-        // In exact arithmetic, pieces have the bits of the function for all modes, whose rows are not early.
-        if options.arithmetic == Arithmetic::Fast {
-            limbs.iter_mut().for_each(|limb| take_early(limb, full, &contacts, &trunk));
-        }
+        limbs.iter_mut().for_each(|limb| take_early(limb, (full, options.arithmetic), &contacts, &trunk));
         let mut tracing = Tracing {
             graph,
             given,
@@ -349,13 +346,13 @@ impl<'g, 'a> Tracing<'g, 'a> {
 }
 
 /// Has rows be eliminated in a limb in those of its modes in which it can follow all that would come to the trunk.
-fn take_early(limb: &mut Limb, full: &Plan, contacts: &[Contact<f64>], trunk: &[bool]) {
+fn take_early(limb: &mut Limb, (full, arithmetic): (&Plan, Arithmetic), contacts: &[Contact<f64>], trunk: &[bool]) {
     let own = limb.contacts.clone();
     limb.take_early(|of_limb| {
         let mut modes = vec![Mode::Open; contacts.len()];
         own.iter().zip(of_limb).for_each(|(contact, mode)| modes[*contact] = *mode);
         let plan = full.acting(&rows_that_act(full.dims.rows, contacts, &modes));
-        let early = plan.early_contacts();
+        let early = plan.early_contacts(arithmetic);
         let at_ends = |plan: &Plan| {
             let plan = plan.with_early_contacts(&early);
             of_contacts(full).all(|index| !reaches_of(&plan, &full.constraints[index].slots, trunk))

@@ -110,11 +110,7 @@ impl<S: Number> Shared<S> {
 
     /// The same with early rows, where some pay.
     fn with_early_rows(self) -> Self {
-        // In exact arithmetic, code has the bits of the interpreter, whose rows are not early.
-        let early = match self.options.arithmetic {
-            Arithmetic::Exact => Vec::new(),
-            Arithmetic::Fast => self.plan.early_contacts(),
-        };
+        let early = self.plan.early_contacts(self.options.arithmetic);
         Shared { early: (!early.is_empty()).then(|| self.plan.with_early_contacts(&early)), ..self }
     }
 

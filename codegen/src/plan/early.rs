@@ -23,6 +23,7 @@ use mbd_runtime::tree::{Elimination, Unknown};
 
 use super::row_order::products;
 use super::structure::{Plan, PlanBond, PlanConstraint, RowsThatAct};
+use crate::options::Arithmetic;
 
 /// A plan with the rows of legs solved where the legs end; `None` where no rows are. Models with contacts, whose rows come and
 /// go, have them at the ground, but for [`Plan::early_contacts`] in some sets of modes.
@@ -139,10 +140,11 @@ const CONTACT_TOLERANCE: f64 = 1e-3;
 impl Plan {
     /// The contacts of this plan, in which some rows act, whose rows should be solved where the legs begin that they bind to the
     /// ground; none where nothing is saved. A leg takes all rows that act on it early, or none: those that its joints can
-    /// follow, at the start and beside it.
-    pub fn early_contacts(&self) -> Vec<usize> {
+    /// follow, at the start and beside it. None in exact arithmetic, in which code has the bits of the interpreter, whose rows are
+    /// not early.
+    pub fn early_contacts(&self, arithmetic: Arithmetic) -> Vec<usize> {
         let RowsThatAct::Some(of) = &self.acts else { return Vec::new() };
-        if self.nodes.iter().any(|node| node.rolled) {
+        if arithmetic == Arithmetic::Exact || self.nodes.iter().any(|node| node.rolled) {
             return Vec::new();
         }
         let full = &of.0;

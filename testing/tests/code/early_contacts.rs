@@ -82,7 +82,7 @@ fn early(
     output: Output,
 ) -> Option<[(Vec<f64>, bool); 2]> {
     let plan = acting(full, modes);
-    let contacts = plan.early_contacts();
+    let contacts = plan.early_contacts(Arithmetic::Fast);
     if contacts.is_empty() {
         return None;
     }
@@ -210,12 +210,12 @@ fn a_leg_at_a_stop_has_no_early_rows() {
     let mut modes = vec![Mode::Open; model.contacts.len()];
     let contact = |name: &str| model.contacts.iter().position(|c| c.name == name).expect("a contact");
     (modes[contact("sole_fl")], modes[contact("sole_hr")]) = (Mode::Stick, Mode::Stick);
-    assert_eq!(acting(&full, &modes).early_contacts(), [contact("sole_fl"), contact("sole_hr")]);
+    assert_eq!(acting(&full, &modes).early_contacts(Arithmetic::Fast), [contact("sole_fl"), contact("sole_hr")]);
     modes[contact("knee_hr/upper")] = Mode::Slide;
-    assert_eq!(acting(&full, &modes).early_contacts(), [contact("sole_fl")]);
+    assert_eq!(acting(&full, &modes).early_contacts(Arithmetic::Fast), [contact("sole_fl")]);
     // A foot that slides has one row, which hip and thigh can follow.
     (modes[contact("sole_hr")], modes[contact("sole_hl")]) = (Mode::Slide, Mode::Slide);
-    assert_eq!(acting(&full, &modes).early_contacts().len(), 3);
+    assert_eq!(acting(&full, &modes).early_contacts(Arithmetic::Fast).len(), 3);
 }
 
 #[test]
@@ -229,7 +229,7 @@ fn a_robot_with_one_leg_has_early_rows() {
         // Those of the first seeds are compared with the interpreter above.
         assert!(factored(&plan.with_contacts(), Output::Rates, &fast()).is_some(), "seed {seed}");
         let on_foot = acting(&plan.with_contacts(), &[Mode::Stick]);
-        let early = on_foot.with_early_contacts(&on_foot.early_contacts());
+        let early = on_foot.with_early_contacts(&on_foot.early_contacts(Arithmetic::Fast));
         let operations = |plan: &Plan| {
             trace(plan, Output::Rates, &fast()).unwrap_or_else(|e| panic!("{e}")).program.counts().total()
         };
