@@ -89,19 +89,20 @@ pub(super) fn partners(n: usize, pairs: impl Iterator<Item = [usize; 2]>) -> Vec
 
 /// A chain of fewer nodes carries the rows at its end to the ground.
 const LONG_CHAIN: usize = 30;
-/// A body on the ground's joint of fewer freedoms is no trunk of an only leg, but a link of it.
+/// Freedoms of the first joint from the ground whose body is the trunk of its only leg. With fewer, it is a link of that leg.
 const FREEDOMS_OF_TRUNK: usize = 3;
 
 /// Rows of loops between the ground and a leg of a trunk, and the node after whose freedoms they are solved.
 fn rows_of_trunks(plan: &Plan) -> Vec<(usize, usize)> {
     let at_ground = |c: &&PlanConstraint| c.slots.iter().all(|g| plan.solve_at_ground.contains(g));
-    let legs = plan.constraints.iter().filter(at_ground).filter_map(|c| Some((leg_of(plan, c)?, c)));
+    let legs = plan.constraints.iter().filter(at_ground).filter_map(|c| Some((leg_of(plan, c, false)?, c)));
     legs.flat_map(|(first, c)| c.slots.iter().map(move |&g| (first, g))).collect()
 }
 
 /// The node at which the leg of a trunk begins that a constraint binds to the ground; for a long chain without branches, the
-/// node before its outer third. A body that floats is the trunk of its only leg, too.
-fn leg_of(plan: &Plan, constraint: &PlanConstraint) -> Option<usize> {
+/// node before its outer third. With `only`, a body that floats is the trunk of its only leg, too: not for rows of loops, which
+/// have no late ones for states in which the leg follows badly.
+fn leg_of(plan: &Plan, constraint: &PlanConstraint, only: bool) -> Option<usize> {
     let PlanBond::Cut { frames, .. } = &constraint.bond else { return None };
     let ([None, Some(foot)] | [Some(foot), None]) = [frames[0].node, frames[1].node] else { return None };
     let mut children = vec![0; plan.nodes.len()];
@@ -110,7 +111,7 @@ fn leg_of(plan: &Plan, constraint: &PlanConstraint) -> Option<usize> {
     let begins = |i: &usize| plan.nodes[*i].parent.is_some_and(|trunk| children[trunk] > 1);
     let third = (way.len() >= LONG_CHAIN).then(|| way[way.len() / 3 - 1]);
     let only = match way[..] {
-        [.., first, trunk] if plan.nodes[trunk].kind.nv() >= FREEDOMS_OF_TRUNK => Some(first),
+        [.., first, trunk] if only && plan.nodes[trunk].kind.nv() >= FREEDOMS_OF_TRUNK => Some(first),
         _ => None,
     };
     let first = way.iter().copied().find(begins).or(third).or(only)?;
@@ -201,7 +202,7 @@ fn rows_of_feet(plan: &Plan, full: &Plan) -> Vec<RowOfFoot> {
     let mut rows = Vec::new();
     for (contact, constraint) in full.constraints[first..].iter().enumerate() {
         if constraint.slots.iter().any(|g| plan.solve_at_ground.contains(g)) {
-            if let Some(first) = leg_of(plan, constraint) {
+            if let Some(first) = leg_of(plan, constraint, true) {
                 rows.extend(constraint.slots.iter().map(|&g| RowOfFoot { contact, first, g }));
             }
         }
