@@ -39,9 +39,6 @@ pub use stepping::{ByRules, FixedSweeps, LastTimeStep, StepImpulses, SteppingSta
 pub use touching::{Reach, Touching};
 pub use with_contacts::WithContacts;
 
-/// Number of contacts up to which all gaps are computed at once: finding out which are far takes as long.
-const FEW: usize = 8;
-
 /// How a contact with restitution throws its bodies apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum RestitutionLaw {

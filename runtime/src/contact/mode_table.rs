@@ -377,7 +377,7 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
     }
 
     fn sees_parts(&self) -> bool {
-        self.contacts.len() > super::FEW && self.full.sees_parts()
+        self.full.sees_parts()
     }
 
     fn gaps_of(

@@ -241,7 +241,11 @@ fn gaps_close_no_faster_than_their_bounds() {
 type Timed = WithContacts<ModeTable<Counted>>;
 
 fn projection<Y: Constrained<Scalar = f64>>(system: &Y) -> Projection<Y> {
-    Projection::new(system, Stabilisation::Mass, Effort { energy: f64::INFINITY, ..Effort::default() })
+    projection_by(system, Stabilisation::Mass)
+}
+
+fn projection_by<Y: Constrained<Scalar = f64>>(system: &Y, stabilisation: Stabilisation) -> Projection<Y> {
+    Projection::new(system, stabilisation, Effort { energy: f64::INFINITY, ..Effort::default() })
 }
 
 /// A quadruped 10 m above the floor whose legs swing.
@@ -457,9 +461,7 @@ fn bits(plan: &Plan, (choice, step, time): (RegimeChoice, Step, f64), whole: boo
     full.whole = whole;
     let (mut q, mut p) = (plan.start(), vec![0.0; plan.dims.nv]);
     let mut system = WithContacts::new(ModeTable::new(full, plan.contacts()));
-    let [after, close] = [(); 2].map(|()| {
-        Projection::new(&system, Stabilisation::default(), Effort { energy: f64::INFINITY, ..Effort::default() })
-    });
+    let [after, close] = [(); 2].map(|()| projection_by(&system, Stabilisation::default()));
     let (method, rules) = (WithPostStep::new(&system, Tsit5::new(&system), after), RegimeRules::new(choice, 1e-3));
     let mut motion = ContactMotion::new(&mut system, (method, step), close, rules, 0.0, (&q, &p)).unwrap();
     let mut events = Landings::default();

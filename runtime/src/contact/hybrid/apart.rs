@@ -3,7 +3,7 @@
 use super::watch::TURN;
 use super::Hybrid;
 use crate::contact::travel::{next_ways, travels};
-use crate::contact::{Mode, Touching, WithContacts, FEW};
+use crate::contact::{Mode, Touching, WithContacts};
 use crate::integrate::Stepper;
 use crate::lists::{copy, get, set};
 use crate::system::Real;
@@ -122,16 +122,10 @@ where
         self.allowed.as_mut().iter_mut().for_each(|allowed| *allowed = steps * *allowed);
     }
 
-    /// Whether gaps of contacts that are far are left out: wherever there are many, also where they are computed all the same,
-    /// so that steps are searched at the same points on every way.
-    fn leaves_out(&self, system: &WithContacts<Y>) -> bool {
-        self.count(system) > FEW
-    }
-
     /// The travel of the last step with the velocities that were found at its end, after [`WithContacts::look`] there. While
     /// contacts are closed, it is asked for only where it can save looks at the others.
     pub(super) fn travel_with_end(&mut self, system: &mut WithContacts<Y>) {
-        if !(system.is_open() || self.leaves_out(system)) {
+        if !(system.is_open() || system.has_many()) {
             return;
         }
         let (two, h) = (Y::Scalar::constant(2.0), self.solver.last_step().1);
@@ -168,7 +162,7 @@ where
     /// Where all reserves are new, minds the contacts that touch or may close in some steps like the last one. In how many, is
     /// chosen so that gaps are computed least often.
     pub(super) fn mind_near(&mut self, system: &mut WithContacts<Y>) {
-        if !self.leaves_out(system) {
+        if !system.has_many() {
             return;
         }
         let (reserve, travel, touching) = (self.reserve.as_ref(), self.travel.as_ref(), self.rules.touching);

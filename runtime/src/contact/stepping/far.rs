@@ -9,7 +9,7 @@
 use super::{StepImpulses, TimeStepping};
 use crate::constrained::PostStep;
 use crate::contact::travel::{next_ways, travels};
-use crate::contact::{Touching, WithContacts, FEW};
+use crate::contact::{Touching, WithContacts};
 use crate::lists::{copy, get, set};
 use crate::system::Real;
 use crate::Scalar;
@@ -173,7 +173,7 @@ where
         at: (&Y::Coordinates, &Y::Momenta),
     ) -> bool {
         // Loops are closed by displacements that nobody knows.
-        if system.modes().len() <= FEW || system.has_loops() {
+        if !system.has_many() || system.has_loops() {
             if !system.modes().is_empty() {
                 self.look_at_end(system, [t, h]);
             }

@@ -15,6 +15,9 @@ use super::{Contact, Mode, Touching};
 use crate::lists::{copy, get, get_or, set};
 use crate::Scalar;
 
+/// Number of contacts up to which all gaps are computed at once: finding out which are far takes as long.
+const FEW: usize = 8;
+
 /// A mechanism with contacts and their modes: its rates include the friction of sliding contacts.
 #[derive(Clone, Debug)]
 pub struct WithContacts<Y: Touching> {
@@ -284,6 +287,12 @@ impl<Y: Touching> WithContacts<Y> {
     pub(super) fn glance_at_all(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) {
         self.minded.as_mut().fill(true);
         self.glance(t, q, p);
+    }
+
+    /// Whether there are so many contacts that those are left out that are far: also where all gaps are computed at once, so that
+    /// steps are searched at the same points on every way.
+    pub(super) fn has_many(&self) -> bool {
+        self.modes.as_ref().len() > FEW
     }
 
     /// Exchanges the contacts that are minded with others.
