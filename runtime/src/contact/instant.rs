@@ -109,6 +109,11 @@ impl<Y: Touching> Touches<Y> {
         symmetrize(a, rows);
     }
 
+    /// Inverse inertia of a row of the problem, after [`Touches::assemble`].
+    pub fn inverse_inertia(&self, row: usize) -> Y::Scalar {
+        get(self.a.as_ref(), row * self.rows() + row)
+    }
+
     /// Multipliers with all rows of sticking contacts and the normal rows of sliding ones held, without friction of the
     /// latter.
     fn hold(&mut self, system: &mut WithContacts<Y>, t: Y::Scalar, q: &Y::Coordinates) {

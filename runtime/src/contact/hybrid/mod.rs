@@ -3,6 +3,7 @@
 mod apart;
 mod jam;
 mod land;
+mod redundant;
 mod report;
 mod resolve;
 mod saltation;

@@ -18,7 +18,8 @@ pub struct ContactRules {
     /// Height of a bounce, m (rad), below which no more bounces are followed: the bodies stay together.
     pub bounce: f64,
     /// Speed of slip, m/s, below which bodies stop at an event if friction can hold them: they would within the time
-    /// `|v|/(µ N/m)`.
+    /// `|v|/(µ N/m)`. Between events, bodies that slide more slowly and come to rest ever more slowly stop where friction
+    /// holds them, or would if its coefficient were larger by a hundred-thousandth.
     pub slip: f64,
     /// Largest number of events within a step of the integration, or at one instant.
     pub events: u32,
@@ -98,6 +99,8 @@ pub struct ContactStatistics {
     pub switches: u64,
     /// Contacts that were closed because their bounces had become too small.
     pub settled: u64,
+    /// Times at which contacts were stopped that crept: whose slip came to an end ever more slowly.
+    pub crept: u64,
     /// Impacts whose expansion was reduced, so that no energy was gained.
     pub limited: u64,
     /// Impacts without an approach, of contacts that friction jams.

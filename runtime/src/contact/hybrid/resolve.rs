@@ -53,7 +53,7 @@ where
         if found.cause == Cause::Slipped {
             system.loads(t, &self.q, true);
         }
-        let own = !system.redundant || system.shares() || found.cause == Cause::Stopped;
+        let own = !system.is_one_of_many(found.contact) || found.cause == Cause::Stopped;
         self.forced = own.then(|| (found.contact, found.cause, system.force(found.contact)));
         match found.cause {
             Cause::Jammed => self.jam_pulling(system, t, &mut event)?,
@@ -161,6 +161,9 @@ where
         if !(fastest.to_f64() > APPROACH) {
             return Ok(None);
         }
+        // What was stopped while it crept has the friction that is described for it.
+        system.reset_grips();
+        self.take_touching(system);
         let rest = self.mark_settling(system, t);
         let touching = &mut self.touching;
         touching.assemble(system, t, &self.q, false);
@@ -263,28 +266,5 @@ where
                 self.touching.take(system, k);
             }
         }
-    }
-
-    /// Whether rows of the closed contacts depend on one another; notes whether anything can move.
-    pub(super) fn has_redundant_rows(&mut self, system: &mut WithContacts<Y>) -> bool {
-        let rows = self.touching.rows();
-        let a = self.touching.a.as_ref();
-        let own = |i: usize| get(a, i * rows + i);
-        let most = (0..rows).fold(Y::Scalar::zero(), |most, i| if own(i) > most { own(i) } else { most });
-        let least = Y::Scalar::constant(1e-12) * most;
-        system.find_pivots(&self.q);
-        let independent = system.sigma.as_ref().iter().filter(|pivot| **pivot != Y::Scalar::zero()).count();
-        self.immobile = independent == self.p.as_ref().len() && system.at_rest();
-        let mut i = 0;
-        let mut redundant = false;
-        for &k in self.touching.order() {
-            let (c, mode) = (system.contact(k), system.mode(k));
-            for j in 0..c.rows() {
-                let left_out = get(system.sigma.as_ref(), c.row + j) == Y::Scalar::zero();
-                redundant |= mode.acts(j) && left_out && own(i) > least;
-                i += 1;
-            }
-        }
-        redundant
     }
 }

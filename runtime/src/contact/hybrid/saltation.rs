@@ -11,7 +11,7 @@
 
 use super::resolve::APPROACH;
 use super::watch::{Found, Watched};
-use super::{Cause, ContactEvent, ContactObserver, Hybrid, SaltationError};
+use super::{Cause, ContactEvent, ContactObserver, ContactStatistics, Hybrid, SaltationError};
 use crate::contact::{Mode, Touching, WithContacts};
 use crate::integrate::{Step, Stepper};
 use crate::system::{Real, System};
@@ -454,11 +454,14 @@ where
         if tangents.iter().any(differs) {
             return Err(SaltationError::Differs { time: time.to_f64() });
         }
-        let (redundant, settled) = (system.redundant, self.statistics.settled);
+        let (redundant, ContactStatistics { settled, crept, .. }) = (system.redundant, self.statistics);
         let event = self.advance(system, t_end, observer)?;
         let time = self.time();
         if let Some(ContactEvent { contact, .. }) = event.filter(|_| self.statistics.settled > settled) {
             return Err(SaltationError::Accumulation { time: time.to_f64(), contact });
+        }
+        if let Some(ContactEvent { contact, .. }) = event.filter(|_| self.statistics.crept > crept) {
+            return Err(SaltationError::Creeps { time: time.to_f64(), contact });
         }
         for tangent in tangents {
             tangent.follow(time)?;

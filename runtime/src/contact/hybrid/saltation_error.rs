@@ -39,6 +39,13 @@ pub enum SaltationError {
         /// The contact.
         contact: usize,
     },
+    /// A contact's slip came to an end ever more slowly, and was stopped by the rules.
+    Creeps {
+        /// Time, s.
+        time: f64,
+        /// The contact.
+        contact: usize,
+    },
     /// The forces of redundant contacts, by which the event was found, are not unique.
     Redundant {
         /// Time, s.
@@ -101,6 +108,10 @@ impl core::fmt::Display for SaltationError {
             SaltationError::Accumulation { time, contact } => write!(
                 f,
                 "the bounces of contact {contact} accumulate at t = {time} s: derivatives end there; make the impact plastic, or end sooner"
+            ),
+            SaltationError::Creeps { time, contact } => write!(
+                f,
+                "contact {contact} slides ever more slowly and is stopped at t = {time} s: derivatives end there; end sooner"
             ),
             SaltationError::Redundant { time, contact } => write!(
                 f,

@@ -13,7 +13,7 @@ const SMALL: f64 = 1e-9;
 /// Force that counts as zero where it has just gone to zero, as a part of the largest momentum, 1/s.
 const NOTHING: f64 = 1e-6;
 /// Contacts stop together whose speeds of slip are below this many times the speed at which one stops.
-const TOGETHER: f64 = 10.0;
+pub(super) const TOGETHER: f64 = 10.0;
 
 impl<Y, M> Hybrid<Y, M>
 where
@@ -136,7 +136,7 @@ where
             system.set_modes(&self.touching);
             system.look(t, &self.q, &self.p);
             copy(self.p.as_mut(), system.p.as_ref());
-            system.redundant = self.has_redundant_rows(system);
+            self.find_redundant_rows(system);
             if !system.shares() {
                 return;
             }

@@ -31,6 +31,8 @@ pub struct WithContacts<Y: Touching> {
     pub(super) slip: Y::PerContact<[Y::Scalar; 2]>,
     /// Whether a contact begins to slide: its friction is against the acceleration of slip.
     begins: Y::PerContact<bool>,
+    /// Coefficient of friction of a contact as a part of the described one: more than one where it crept and was stopped.
+    grip: Y::PerContact<Y::Scalar>,
     /// Memory for the forces by which the direction of slip that begins is found.
     instant: Option<Touches<Y>>,
     /// Whether it has forces found with the present modes, from which the next ones are searched.
@@ -43,6 +45,8 @@ pub struct WithContacts<Y: Touching> {
     rounding: f64,
     /// Whether rows of closed contacts depend on one another.
     pub(super) redundant: bool,
+    /// Whether a contact that slides with friction is among those whose forces are not unique for this reason.
+    pub(super) shares: bool,
     pub(super) at: Contacts<Y>,
     /// Contacts that [`WithContacts::look`] looks at: all that are not known to be far.
     minded: Y::PerContact<bool>,
@@ -91,12 +95,14 @@ impl<Y: Touching> WithContacts<Y> {
             closed: false,
             slip: system.per_contact([zero; 2]),
             begins: system.per_contact(false),
+            grip: system.per_contact(Y::Scalar::one()),
             instant: Some(Touches::new(&system)),
             near: false,
             unsure: false,
             rubs: false,
             rounding: 0.0,
             redundant: false,
+            shares: false,
             at: Contacts {
                 v: momenta(&system),
                 gaps: rows(&system),
@@ -199,8 +205,12 @@ impl<Y: Touching> WithContacts<Y> {
 
     fn modes_are_set(&mut self) {
         (self.near, self.unsure, self.rounding) = (false, false, 0.0);
-        for (pressed, mode) in self.pressed.as_mut().iter_mut().zip(self.modes.as_ref()) {
+        let of_contacts = self.pressed.as_mut().iter_mut().zip(self.grip.as_mut());
+        for ((pressed, grip), mode) in of_contacts.zip(self.modes.as_ref()) {
             *pressed = *mode != Mode::Open;
+            if *mode != Mode::Stick {
+                *grip = Y::Scalar::one();
+            }
         }
         self.restore();
         self.rubs = (0..self.modes.as_ref().len()).any(|k| self.rubs(k));
@@ -208,7 +218,13 @@ impl<Y: Touching> WithContacts<Y> {
 
     /// Whether contacts that slide with friction share a load.
     pub(super) fn shares(&self) -> bool {
-        self.rubs && self.redundant
+        self.rubs && self.shares
+    }
+
+    /// Whether contact `k` is one of those whose forces are not unique and are not looked at one by one: contacts that stick,
+    /// or have no friction, among redundant ones. What moves does not depend on how they share their load.
+    pub(super) fn is_one_of_many(&self, k: usize) -> bool {
+        self.redundant && !self.shares() && self.mode(k) != Mode::Open && !self.rubs(k)
     }
 
     /// Lets rows act as `modes` say, for a solve; [`WithContacts::restore`] ends this.
@@ -241,8 +257,21 @@ impl<Y: Touching> WithContacts<Y> {
         self.system.position_correction(q, residual, &mut self.response_v, pivots);
     }
 
+    /// Contact `k`, with the friction that holds it.
     pub(super) fn contact(&self, k: usize) -> Contact<Y::Scalar> {
-        self.system.contacts().get(k).map_or(Contact::nowhere(), |contact| *contact)
+        let grip = get_or(self.grip.as_ref(), k, Y::Scalar::one());
+        let contact = self.system.contacts().get(k);
+        contact.map_or(Contact::nowhere(), |contact| Contact { friction: grip * contact.friction, ..*contact })
+    }
+
+    /// Sets the coefficient of friction of contact `k`, as a part of the described one, until it no longer sticks or is hit.
+    pub(super) fn set_grip(&mut self, k: usize, grip: Y::Scalar) {
+        set(self.grip.as_mut(), k, grip);
+    }
+
+    /// Gives all contacts the friction that is described for them.
+    pub(super) fn reset_grips(&mut self) {
+        self.grip.as_mut().fill(Y::Scalar::one());
     }
 
     /// Momenta freed of multipliers, in `self.p`, and their velocities, in `self.at.v`.
