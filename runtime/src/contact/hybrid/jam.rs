@@ -42,13 +42,13 @@ const STUCK: u32 = 10;
 /// Part of the largest force that is left after a jam, at most, where steps have shrunk before it.
 const LEFT: f64 = 0.1;
 
-/// Events are at one instant that are no more than so many times the rounding error of the time later than the first.
+/// Events are at one instant that are no more than so many times the rounding error of the time later than the one before.
 const INSTANT: f64 = 1e3;
 
 /// Events at one instant.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Crowd<S> {
-    /// Time of the first, s.
+    /// Time of the last, s.
     time: S,
     /// How many follow the first.
     events: u32,
@@ -128,7 +128,7 @@ where
         let Crowd { time, events, stuck, jams } = self.crowd;
         let same = !((t - time).to_f64() > INSTANT * Y::Scalar::epsilon() * t.to_f64().abs());
         self.crowd = match same {
-            true => Crowd { time, events: events + 1, stuck: stuck + 1, jams },
+            true => Crowd { time: t, events: events + 1, stuck: stuck + 1, jams },
             false => Crowd::at(t),
         };
         match self.crowd.events > self.rules.events {

@@ -55,7 +55,7 @@ pub struct Problem<'a, S> {
 pub enum Effort {
     /// Until the relative residual is below a tolerance.
     ToTolerance {
-        /// Relative residual.
+        /// Relative residual. Where no search reaches it, one a hundred times as large will do; the certificate tells it.
         tolerance: f64,
         /// Largest number of rounds of sweeps and Newton steps.
         rounds: u32,

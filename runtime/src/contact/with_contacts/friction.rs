@@ -65,10 +65,12 @@ impl<Y: Touching> WithContacts<Y> {
         if !self.rubs {
             return;
         }
-        self.unsure = false;
+        // Where the last step has not found the forces that give its direction, or these are not unique, slip has the direction of
+        // its velocity from now on.
+        let unsure = core::mem::take(&mut self.unsure) || self.shares();
         self.look_at_closed(t, q, p);
         for k in 0..self.modes.as_ref().len() {
-            let begins = self.begins(k) && !(self.speed(k).to_f64() > CREEP);
+            let begins = self.begins(k) && !unsure && !(self.speed(k).to_f64() > CREEP);
             set(self.begins.as_mut(), k, begins);
             if self.rubs(k) {
                 let direction = self.direction(k);
