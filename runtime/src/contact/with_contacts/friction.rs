@@ -65,9 +65,8 @@ impl<Y: Touching> WithContacts<Y> {
         if !self.rubs {
             return;
         }
-        // Where the last step has not found the forces that give its direction, or these are not unique, slip has the direction of
-        // its velocity from now on.
-        let unsure = core::mem::take(&mut self.unsure) || self.shares();
+        // Where the last step has not found the forces that give its direction, slip has that of its velocity from now on.
+        let unsure = core::mem::take(&mut self.unsure);
         self.look_at_closed(t, q, p);
         for k in 0..self.modes.as_ref().len() {
             let begins = self.begins(k) && !unsure && !(self.speed(k).to_f64() > CREEP);
