@@ -311,3 +311,77 @@ axis = [0, 1, 0]
     let event = scene.events.0.first().expect("the rod hits the wall");
     assert!((event.time - a).abs() < 1e-10, "{} {a}", event.time);
 }
+
+#[test]
+fn a_box_that_holds_does_not_feel_what_slides_beside_it() {
+    // A box on four corners stands on a slope, and a sled that hangs on it by a rail slides down. The load of the rear corners is
+    // smaller than their part of the friction if all corners share it, so that they would slip; but together they hold, and the
+    // force that the sled feels is its own whatever they do.
+    let (slope, friction) = (0.3_f64.atan(), 0.2);
+    let (along, across) = (9.81 * slope.sin(), 9.81 * slope.cos());
+    let model = model(&format!(
+        r#"
+name = "box_and_sled"
+gravity = [{along}, 0, -{across}]
+[[body]]
+name = "box"
+mass = 2
+com = [0, 0, 0.15]
+inertia = [0.02, 0.03, 0.04]
+[[body]]
+name = "rail"
+mass = 0.01
+[[body]]
+name = "sled"
+mass = 0.5
+[[joint]]
+name = "motion"
+type = "floating"
+child = "box"
+[[joint]]
+name = "height"
+type = "prismatic"
+parent = "box"
+child = "rail"
+xyz = [0, 0.6, -0.1]
+axis = [0, 0, 1]
+[[joint]]
+name = "way"
+type = "prismatic"
+parent = "rail"
+child = "sled"
+axis = [1, 0, 0]
+[[shape]]
+name = "floor"
+type = "plane"
+[[shape]]
+name = "crate"
+body = "box"
+type = "box"
+size = [0.4, 0.3, 0.2]
+[[shape]]
+name = "sole"
+body = "sled"
+type = "point"
+[[contact]]
+name = "crate"
+between = ["floor", "crate"]
+friction = 0.4
+[[contact]]
+name = "sole"
+between = ["floor", "sole"]
+friction = {friction}
+"#
+    ));
+    let start = [0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0];
+    let mut scene = Scene::new(model, &start, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1]);
+    scene.steps = 10_000;
+    scene.run(0.5);
+    // The rail, of 0.01 kg, lies on the sled.
+    let way = 0.1 * 0.5 + 0.5 * (along - friction * across * 0.51 / 0.5) * 0.25;
+    println!("{} events, {:e} m off", scene.events.0.len(), scene.q[8] - way);
+    assert!(scene.events.0.is_empty(), "{:?}", scene.events.0.last());
+    assert!((scene.q[8] - way).abs() < 1e-12, "{} {way}", scene.q[8]);
+    let moved = scene.q[..7].iter().zip(start).map(|(q, start)| (q - start).abs());
+    assert!(moved.fold(0.0, f64::max) < 1e-14, "{:?}", scene.q);
+}

@@ -1,5 +1,6 @@
 //! Motions that are stiff because bodies slide slowly: friction turns the slip within `|v| m/(µ N)`.
 
+use mbd_codegen::model::Model;
 use mbd_codegen::plan::Plan;
 use mbd_runtime::constrained::{Effort, Projection, Stabilisation, WithPostStep};
 use mbd_runtime::contact::{Hybrid, Mode, WithContacts};
@@ -97,6 +98,26 @@ fn slow_slip_does_not_shorten_steps() {
     assert!(slow[0] > 1e-5 && off <= 1e-12, "{slow:?} {fast:?}");
     assert!(5 * switched.steps < explicit.steps, "{switched:?} beside {explicit:?}");
     assert!(switched.jacobians > 0);
+}
+
+/// The rail and the cart of [`CREEPING`] on a level floor, held by springs, with so much damping that they do not swing.
+fn sprung() -> Model {
+    let text = CREEPING.replace("gravity = [3, 0, -9]", "gravity = [0, 0, -9]");
+    let text = text.replace("damping = 1.5", "damping = 12\nstiffness = 60");
+    model(&text.replace("damping = 1\n", "damping = 8\nstiffness = 20\n"))
+}
+
+#[test]
+fn what_creeps_to_rest_is_stopped() {
+    // The springs pull the point over the floor until friction carries their force. It gets there ever more slowly, and at no
+    // time: it is stopped where friction that is a hundred-thousandth larger would carry it.
+    let plan = Plan::new(&sprung(), 1e-9);
+    let start = (&plan, &[0.05, -0.2, 0.0][..], &[0.0; 3][..]);
+    let (q, _, modes, statistics) = run(start, (1e-9, 60.0), switching);
+    assert_eq!(modes, [Mode::Stick]);
+    let beyond = (60.0 * q[0]).hypot(20.0 * q[1]) / (0.5555 * 0.3 * 9.0) - 1.0;
+    println!("{beyond:e}, {statistics:?}");
+    assert!(beyond > 1e-7 && beyond < 1e-5, "{beyond:e}");
 }
 
 #[test]

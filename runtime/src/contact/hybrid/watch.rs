@@ -271,12 +271,10 @@ where
                 && slows(self, contact, &now) < rate * time
                 && (0..self.count(system)).all(|k| sticks(k) || slides(self, system, k, TOGETHER * slip).is_none())
         });
-        if !creeps {
-            grip(self, system, 0.0);
-            return None;
-        }
-        self.statistics.crept += 1;
-        Some(contact)
+        // The larger friction makes up for the damping of what no longer moves, too.
+        grip(self, system, if creeps { CREEPING } else { 0.0 });
+        self.statistics.crept += u64::from(creeps);
+        creeps.then_some(contact)
     }
 
     /// The event at which the forces of redundant contacts stop to be possible, if they have in the last step. Their
