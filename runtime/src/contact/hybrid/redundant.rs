@@ -83,7 +83,7 @@ where
             set(state, best, pivot);
             copy(line, part(matrix, best * rows, rows));
             let by = get(line, best);
-            for (i, other) in matrix.chunks_exact_mut(rows).enumerate() {
+            for (i, other) in matrix.chunks_exact_mut(rows.max(1)).enumerate() {
                 let factor = if i == best { (get(other, best) - one) / by } else { get(other, best) / by };
                 for (x, line) in other.iter_mut().zip(&*line) {
                     *x = *x - factor * *line;
