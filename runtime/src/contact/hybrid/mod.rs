@@ -1,6 +1,7 @@
 //! Motion with contacts: steps of any method between events, and what happens at the events.
 
 mod apart;
+mod creep;
 mod jam;
 mod land;
 mod redundant;

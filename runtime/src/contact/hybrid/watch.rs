@@ -1,11 +1,10 @@
 //! The functions that are watched within a step, and the first of their zeros.
 
-use super::select::TOGETHER;
 use super::{Cause, Hybrid, HybridError};
-use crate::contact::{Contact, Mode, Touching, WithContacts};
+use crate::contact::{Mode, Touching, WithContacts};
 use crate::integrate::root::{resolution, root};
 use crate::integrate::Stepper;
-use crate::lists::{copy, get_or};
+use crate::lists::copy;
 use crate::system::Real;
 use crate::Scalar;
 
@@ -15,12 +14,6 @@ const STRETCHES: u32 = 4;
 /// may be many turns long, because no error limits them.
 const MOST_STRETCHES: f64 = 1e6;
 pub(super) const TURN: f64 = 1.0;
-/// Speed of slip, m/s, below which bodies that slide ever more slowly may come to rest.
-const STANDSTILL: f64 = 1e-10;
-/// Part by which friction may be larger to hold a contact that creeps, and part of the deceleration by friction below which a
-/// contact creeps.
-const CREEPING: f64 = 1e-5;
-const SLOWLY: f64 = 0.01;
 /// Part of the force at the end of a stretch by which a contact pulls at its start, if it does not just begin to.
 const PULLS: f64 = 1e-3;
 /// Part of the normal force by which the force of a contact that sticks is beyond the friction cone, not on it.
@@ -219,62 +212,6 @@ where
         if system.minds_all() {
             self.mind_near(system);
         }
-    }
-
-    /// The first contact that slides so slowly at the end of the step that friction may stop it there. Where bodies slide
-    /// and spin, the direction of slip turns ever faster as they come to rest, and steps shrink without end. After
-    /// [`Hybrid::first_event`] has evaluated the last stretch.
-    fn ends_turning(&self, system: &WithContacts<Y>) -> Option<usize> {
-        (0..self.count(system)).find(|&k| {
-            let [before, now] = [&self.right, &self.left].map(|at| get_or(at.as_ref(), k, Watched::zero()));
-            let slow = now.speed.to_f64() < STANDSTILL && now.speed < before.speed;
-            slow && system.slides_on(k)
-        })
-    }
-
-    /// The first contact that creeps at the end of the step, whose last stretch takes `time`, s: it slides more slowly than the
-    /// rules follow, friction holds it if it is larger by a little, and slip does not end at the rate at which friction can end
-    /// it. A damped leg spreads until friction carries it: slip then ends ever more slowly, and its direction asks for ever
-    /// shorter steps. What creeps has the larger friction until it no longer sticks.
-    fn creeps(&mut self, system: &mut WithContacts<Y>, time: Y::Scalar) -> Option<usize> {
-        let slip = self.rules.slip;
-        let slides = |hybrid: &Self, system: &WithContacts<Y>, k: usize, most: f64| {
-            let now = get_or(hybrid.left.as_ref(), k, Watched::zero());
-            (system.slides_on(k) && now.speed.to_f64() < most).then_some(now)
-        };
-        let slows = |hybrid: &Self, k: usize, now: &Watched<Y::Scalar>| {
-            get_or(hybrid.right.as_ref(), k, Watched::zero()).speed - now.speed
-        };
-        let contact = (0..self.count(system))
-            .find(|&k| slides(self, system, k, slip).is_some_and(|now| slows(self, k, &now) >= Y::Scalar::zero()))?;
-        let now = slides(self, system, contact, slip)?;
-        let (t, h) = self.solver.last_step();
-        self.solver.dense(system, Y::Scalar::one(), &mut self.q, &mut self.p);
-        system.look(t + h, &self.q, &self.p);
-        let grip = |hybrid: &Self, system: &mut WithContacts<Y>, more: f64| {
-            for k in 0..hybrid.count(system) {
-                if slides(hybrid, system, k, TOGETHER * slip).is_some() {
-                    system.set_grip(k, Y::Scalar::constant(1.0 + more));
-                }
-            }
-        };
-        let creeps = [0.0, CREEPING].into_iter().any(|more| {
-            grip(self, system, more);
-            self.touching.take_closed(system);
-            let found = self.select(system, t + h).is_ok();
-            let touch = self.touching.order().iter().position(|k| *k == contact);
-            let c = touch.map_or(Contact::nowhere(), |i| self.touching.touch(i).contact);
-            let inverse = self.touching.inverse_inertia(c.row + 1);
-            let rate = Y::Scalar::constant(SLOWLY) * c.friction * now.first * inverse;
-            let sticks = |k: usize| get_or(self.touching.modes.as_ref(), k, Mode::Open) == Mode::Stick;
-            found
-                && slows(self, contact, &now) < rate * time
-                && (0..self.count(system)).all(|k| sticks(k) || slides(self, system, k, TOGETHER * slip).is_none())
-        });
-        // The larger friction makes up for the damping of what no longer moves, too.
-        grip(self, system, if creeps { CREEPING } else { 0.0 });
-        self.statistics.crept += u64::from(creeps);
-        creeps.then_some(contact)
     }
 
     /// The event at which the forces of redundant contacts stop to be possible, if they have in the last step. Their
