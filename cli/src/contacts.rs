@@ -12,8 +12,8 @@ use multibody::codegen::{Arithmetic, Options};
 use multibody::runtime::catalogue::BoxedMethod;
 use multibody::runtime::constrained::{Effort, Projection, WithPostStep};
 use multibody::runtime::contact::{
-    Cause, ContactEvent, ContactMotion, ContactObserver, ContactStatistics, HybridError, Mode, ModeTable, Regime,
-    RegimeChange, RegimeChoice, RegimeReason, RegimeStatistics, SteppingStatistics, Stretch, WithContacts,
+    Cause, ContactError, ContactEvent, ContactMotion, ContactObserver, ContactStatistics, HybridError, Mode, ModeTable,
+    Regime, RegimeChange, RegimeChoice, RegimeReason, RegimeStatistics, SteppingStatistics, Stretch, WithContacts,
 };
 use multibody::runtime::integrate::{AutoSwitch, Radau5, Statistics, Step};
 use multibody::runtime::Conjugate;
@@ -281,9 +281,20 @@ fn failure(plan: &Plan, error: &HybridError) -> Failure {
             "give --q with a position where they are apart or touch",
         ),
         other => Failure::new(
-            format!("the simulation failed: {other}"),
+            format!("the simulation failed: {other}{}", named(plan, other)),
             "a smaller --tolerance, or a shorter --time, shows what came before; nothing was written",
         ),
+    }
+}
+
+/// The name of the contact that an error states by its number, in brackets.
+fn named(plan: &Plan, error: &HybridError) -> String {
+    match error {
+        HybridError::Contact {
+            error: ContactError::NoConvergence { touch, .. } | ContactError::Wedged { touch, .. },
+            ..
+        } => format!(" (contact {touch} is `{}`)", name(plan, *touch)),
+        _ => String::new(),
     }
 }
 

@@ -431,3 +431,18 @@ fn gravity(value: &[TokenTree]) -> Result<[f64; 3], Message> {
     }
     Ok(g)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::KEYS;
+
+    #[test]
+    fn the_book_has_every_argument() {
+        let page = include_str!("../../book/src/macro.md");
+        let rows: Vec<&str> = page.lines().filter(|line| line.starts_with("| `")).collect();
+        for key in KEYS {
+            let stated = format!("`{key} = ");
+            assert!(rows.iter().any(|row| row.contains(&stated)), "book/src/macro.md has no row for `{key}`");
+        }
+    }
+}

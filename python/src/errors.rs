@@ -88,6 +88,9 @@ impl Failed {
             StepError::NotFinite { index, .. } => ("not_finite", vec![("index", index as f64)]),
             StepError::Quaternion { index, norm, .. } => ("quaternion", vec![("index", index as f64), ("norm", norm)]),
             StepError::StepTooSmall { step, error, .. } => ("step_too_small", vec![("step", step), ("error", error)]),
+            StepError::InvalidStep { step, .. } => ("invalid_step", vec![("step", step)]),
+            StepError::InvalidEnd { .. } => ("invalid_end", vec![]),
+            StepError::InvalidTolerances { .. } => ("invalid_tolerances", vec![]),
             StepError::NoEstimate { .. } => ("no_estimate", vec![]),
             StepError::TooManySteps { steps, .. } => ("too_many_steps", vec![("steps", steps as f64)]),
             StepError::NoConvergence { step, iterations, change, .. } => {

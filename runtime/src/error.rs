@@ -1,6 +1,6 @@
 //! Errors of steps and of constraints.
 
-use crate::system::{Part, System};
+use crate::system::{Part, Real, System};
 
 /// Reason why a step failed.
 ///
@@ -9,8 +9,8 @@ use crate::system::{Part, System};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum StepError {
-    /// A rate or a component of the new state is infinite or not a number: the motion diverges, or the mechanism is
-    /// singular there.
+    /// A rate, or a component of the state that was given or of the new one, is infinite or not a number: the motion
+    /// diverges, or the mechanism is singular there.
     NotFinite {
         /// Time, s.
         time: f64,
@@ -34,6 +34,23 @@ pub enum StepError {
         step: f64,
         /// Error of that step relative to the tolerances; not a number where the rates were not finite.
         error: f64,
+    },
+    /// A step that is not greater than zero, or not finite, was asked for.
+    InvalidStep {
+        /// Time, s.
+        time: f64,
+        /// The step, s.
+        step: f64,
+    },
+    /// A run was asked for whose end is not a number.
+    InvalidEnd {
+        /// Time, s.
+        time: f64,
+    },
+    /// A tolerance is negative or not a number, or no component has one that is greater than zero.
+    InvalidTolerances {
+        /// Time, s.
+        time: f64,
     },
     /// Adaptive steps were requested from a method without an error estimate.
     NoEstimate {
@@ -83,12 +100,26 @@ impl StepError {
             StepError::NotFinite { time, .. }
             | StepError::Quaternion { time, .. }
             | StepError::StepTooSmall { time, .. }
+            | StepError::InvalidStep { time, .. }
+            | StepError::InvalidEnd { time }
+            | StepError::InvalidTolerances { time }
             | StepError::NoEstimate { time }
             | StepError::TooManySteps { time, .. }
             | StepError::NoConvergence { time, .. }
             | StepError::Singular { time, .. }
             | StepError::Constraint { time, .. } => time,
         }
+    }
+}
+
+/// Whether a motion whose state is at time `t` (s) goes on to `t_end` (s).
+///
+/// # Errors
+/// [`StepError::InvalidEnd`] if the end is not a number.
+pub(crate) fn is_before<S: Real>(t: S, t_end: S) -> Result<bool, StepError> {
+    match t_end.to_f64().is_nan() {
+        true => Err(StepError::InvalidEnd { time: t.to_f64() }),
+        false => Ok(t < t_end),
     }
 }
 
@@ -117,6 +148,13 @@ impl StepError {
             }
             StepError::StepTooSmall { time, step, error } => {
                 write!(f, "the step fell to {step:e} s at t = {time} s with {error:.1e} times the allowed error: loosen the tolerances, or take an implicit method")
+            }
+            StepError::InvalidStep { step, .. } => {
+                write!(f, "a step of {step} s was asked for: give one that is greater than zero and finite")
+            }
+            StepError::InvalidEnd { .. } => write!(f, "the time at which the run should end is not a number"),
+            StepError::InvalidTolerances { .. } => {
+                write!(f, "a tolerance is negative or not a number, or all are zero: give one greater than zero, such as 1e-9")
             }
             StepError::NoEstimate { .. } => write!(f, "this method estimates no error: give it a fixed step"),
             StepError::TooManySteps { time, steps } => {

@@ -27,10 +27,10 @@ pub(crate) fn array<T: Copy, const N: usize>(f: impl FnMut(usize) -> T) -> [T; N
     core::array::from_fn(f)
 }
 
-/// The size of the largest entry; zero of none.
+/// The size of the largest entry, not finite where one is not; zero of none.
 #[inline(always)]
 pub(crate) fn largest<S: Real>(list: &[S]) -> S {
-    list.iter().fold(S::zero(), |most, x| if x.abs() > most { x.abs() } else { most })
+    list.iter().fold(S::zero(), |most, x| if x.abs() > most || !x.is_finite() { x.abs() } else { most })
 }
 
 /// The first `n` entries.

@@ -65,7 +65,8 @@ impl Plan {
             })
         };
         for node in &self.nodes {
-            letters.push_str(&format!("|{:?} {:?} {}: ", node.parent, discriminant(&node.kind), node.quarter));
+            let (kind, source) = (discriminant(&node.kind), discriminant(&node.source));
+            letters.push_str(&format!("|{:?} {kind:?} {source:?} {}: ", node.parent, node.quarter));
             for step in &node.place {
                 match step {
                     PoseStep::Turn { axis, c, s } => {

@@ -101,7 +101,8 @@ fn rows_of_trunks(plan: &Plan) -> Vec<(usize, usize)> {
 
 /// The node at which the leg of a trunk begins that a constraint binds to the ground; for a long chain without branches, the
 /// node before its outer third. With `only`, the body of a first joint of three freedoms or more is the trunk of its only
-/// leg, too: not for rows of loops, which have no late ones for states in which the leg follows badly.
+/// leg, too. That is for contacts alone: where the leg is nearly singular, their rows can be eliminated at the ground instead, those of
+/// loops cannot.
 fn leg_of(plan: &Plan, constraint: &PlanConstraint, only: bool) -> Option<usize> {
     let PlanBond::Cut { frames, .. } = &constraint.bond else { return None };
     let ([None, Some(foot)] | [Some(foot), None]) = [frames[0].node, frames[1].node] else { return None };

@@ -108,9 +108,10 @@ pub struct Plan {
     pub nodes: Vec<PlanNode>,
     /// Dimensions.
     pub dims: Dims,
-    /// Shared coordinates, and rows of constraints.
+    /// Unknowns that are not solved at a node of their own: shared coordinates, freedoms that are eliminated later, and rows of
+    /// constraints.
     pub unknowns: Vec<Unknown>,
-    /// Shared coordinates solved at the ground.
+    /// Those of them that are solved at the ground.
     pub solve_at_ground: Vec<usize>,
     /// Frames of the moving joints' child bodies, in joint order, then those of all other bodies and frames.
     pub frames: Vec<PlanFrame>,
@@ -120,7 +121,7 @@ pub struct Plan {
     pub slots: Vec<Slot>,
     /// Frame index and axes of each wrench.
     pub wrenches: Vec<(usize, WrenchAxes)>,
-    /// Loops and couplings.
+    /// Loops and couplings, then contacts, once [`Plan::with_contacts`] has made constraints of them.
     pub constraints: Vec<PlanConstraint>,
     /// The two frames of every contact between bodies, until contacts are among the constraints.
     pub contact_frames: Vec<Option<[PlanFrame; 2]>>,

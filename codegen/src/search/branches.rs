@@ -104,7 +104,9 @@ struct TreeSearch {
 
 /// The result of the search for a chain, which is used for every chain that is alike, such as that of the other leg.
 struct Cached {
+    /// The structure of the part, and which of its nodes are the chain.
     letters: String,
+    chain: Vec<usize>,
     /// The eliminations of the chain and of those beyond it, in the numbers of its part, for each objective.
     choices: [Choices; 2],
     tried: Vec<Candidate>,
@@ -120,7 +122,8 @@ impl TreeSearch {
         let last = inside[inside.len() - 1];
         let inner = single.nodes.iter().any(|node| node.parent == Some(last));
         let part = ChainInPart { single, chain: inside, inner };
-        let like = self.cache.iter().position(|c| c.letters == letters && self.is_accurate(&c.choices, &part));
+        let alike = |c: &Cached| c.letters == letters && c.chain == part.chain && self.is_accurate(&c.choices, &part);
+        let like = self.cache.iter().position(alike);
         let like = like.unwrap_or_else(|| {
             let cached = self.search(&part, beyond, letters);
             self.cache.push(cached);
@@ -174,7 +177,7 @@ impl TreeSearch {
                 passing: passing.map(|(_, passing)| passing),
             });
         }
-        Cached { letters, choices: [first, second], tried }
+        Cached { letters, chain: part.chain.clone(), choices: [first, second], tried }
     }
 }
 

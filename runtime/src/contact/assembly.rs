@@ -47,8 +47,9 @@ pub(super) fn lines<'a, S: Real>(all: &'a [Contact<S>], of: Forces<'a, S>) -> im
     })
 }
 
-/// Momenta at one state, by their number, and what is to become of their velocities: the first are zero, those of unit forces
-/// at contacts follow. [`Touching::project_columns`] takes them.
+/// Momenta `p` at one state whose velocities are wanted, `M v = p`: column 0 is `p = 0`, whose velocities come from prescribed
+/// motions alone; column `i + 1` is `Φᵀ` times a unit force at line `i` of the contacts. The velocities become the
+/// inverse inertia of the contacts. [`Touching::project_columns`] takes them.
 #[derive(Debug)]
 pub struct Columns<'a, S> {
     of: Forces<'a, S>,

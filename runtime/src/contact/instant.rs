@@ -2,8 +2,10 @@
 
 use super::assembly::{lines, symmetrize, Forces};
 use super::solver::{factor, solve_factored, solve_near};
-use super::{solve, Certificate, Contact, ContactError, Effort, Mode, Problem, Touch, Touching, WithContacts};
+use super::{solve, Certificate, Contact, ContactError, Effort, HybridError, Mode};
+use super::{Problem, Touch, Touching, WithContacts};
 use crate::lists::{copy, first, first_mut, get, get_or, set, split};
+use crate::system::Real;
 use crate::Scalar;
 
 /// Compliance of a contact among those that share a load, as a part of that by its inertia, and the number of times that
@@ -62,6 +64,11 @@ impl<Y: Touching> Touches<Y> {
     /// The contact that takes part as number `i`.
     pub fn contact(&self, i: usize) -> usize {
         get_or(self.order(), i, usize::MAX)
+    }
+
+    /// An error of the problem at time `t` (s), told of the contact by its number in the mechanism.
+    pub fn error(&self, t: Y::Scalar, error: ContactError) -> HybridError {
+        HybridError::Contact { time: t.to_f64(), error: error.at(|touch| self.contact(touch)) }
     }
 
     /// The same as a contact of the problem.

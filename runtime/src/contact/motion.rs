@@ -4,7 +4,7 @@ use super::hybrid::{ContactObserver, ContactStatistics, Hybrid, HybridError};
 use super::stepping::{SteppingStatistics, TimeStepping};
 use super::{Mode, Touching, WithContacts};
 use crate::constrained::PostStep;
-use crate::error::StepError;
+use crate::error::{is_before, StepError};
 use crate::integrate::{Statistics, Step, Stepper};
 use crate::system::Real;
 use crate::Scalar;
@@ -139,9 +139,9 @@ where
 {
     /// At time `t` (s) and a state, with steps `step` of the method between events.
     ///
-    /// What touches at the start is resolved as in a motion by events. Where that fails, a motion that may choose begins by
-    /// time steps, as one by time steps always does, and where bodies overlap by more than motion by events begins with, but no
-    /// more than 1 mm (or mrad).
+    /// What touches at the start is resolved as in a motion by events. [`RegimeChoice::Automatic`] begins with time steps where that
+    /// fails, and where bodies overlap by more than a hundred times [`ContactRules::touching`](super::ContactRules::touching). An
+    /// overlap of more than 1 mm (or mrad) is an error.
     ///
     /// # Errors
     /// [`HybridError`].
@@ -154,7 +154,7 @@ where
         (q, p): (&Y::Coordinates, &Y::Momenta),
     ) -> Result<Self, HybridError> {
         if !(rules.step > 0.0 && rules.step.is_finite()) {
-            return Err(StepError::StepTooSmall { time: t.to_f64(), step: rules.step, error: 0.0 }.into());
+            return Err(StepError::InvalidStep { time: t.to_f64(), step: rules.step }.into());
         }
         let steps = TimeStepping::new(system, post_step);
         let overlap = if rules.choice == RegimeChoice::Events { 0.0 } else { OVERLAP };
@@ -243,7 +243,7 @@ where
     ) -> Result<(), HybridError> {
         let limits = *self.events.limits_mut();
         let mut left = limits.steps;
-        while self.time() < t_end {
+        while is_before(self.time(), t_end)? {
             limits.spend(&mut left, self.time().to_f64())?;
             self.advance(system, t_end, observer)?;
         }
@@ -280,6 +280,9 @@ where
         observer: &mut impl ContactObserver<Y>,
     ) -> Result<(), HybridError> {
         let (begin, regime) = (self.time(), self.regime);
+        if !is_before(begin, t_end)? {
+            return Ok(());
+        }
         let change = match regime {
             Regime::Events => self.follow(system, t_end, observer)?,
             Regime::TimeSteps => self.step(system, t_end, observer)?,
@@ -403,7 +406,7 @@ where
             system.restore();
             result.map_err(|error| StepError::Constraint { time: t.to_f64(), error })?;
         }
-        events.restart(system, *t, &at, p)?;
+        events.move_to(system, *t, (&at, p))?;
         statistics.closed = statistics.closed.max(closed);
         Ok(())
     }

@@ -47,6 +47,16 @@ impl Tolerances {
         }
     }
 
+    /// Whether they limit the error of something: none is negative or not a number, and one of those by which the step is chosen
+    /// is greater than zero.
+    pub(super) fn control_errors(&self) -> bool {
+        let coordinates = [self.coordinates.absolute, self.coordinates.relative, self.rotations];
+        let momenta = [self.momenta.absolute, self.momenta.relative];
+        let full = self.control == Control::Full;
+        coordinates.iter().chain(&momenta).all(|x| *x >= 0.0)
+            && (coordinates.iter().any(|x| *x > 0.0) || full && momenta.iter().any(|x| *x > 0.0))
+    }
+
     /// These tolerances, with steps chosen by the errors of the coordinates alone.
     pub const fn coordinates_only(self) -> Self {
         Tolerances { control: Control::Coordinates, ..self }
@@ -66,7 +76,7 @@ pub enum Step {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Limits {
-    /// Smallest step, s; with zero, the smallest step that still changes the time.
+    /// Smallest step, s; steps that would not change the time, or are below 1e-15 s, are too small in any case.
     pub min_step: f64,
     /// Largest step, s.
     pub max_step: f64,

@@ -4,6 +4,7 @@ use super::root;
 use super::solver::Solver;
 use super::stepper::Stepper;
 use super::StepError;
+use crate::error::is_before;
 use crate::system::{Real, System};
 use crate::Scalar;
 
@@ -140,7 +141,7 @@ where
             }
         }
         let mut left = self.limits.steps;
-        while self.time() < t_end {
+        while is_before(self.time(), t_end)? {
             self.counted(system, t_end, &mut left)?;
             track.turn_over();
             if let Some(outcome) = self.scan(system, events, &mut track)? {

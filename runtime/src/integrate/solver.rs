@@ -4,6 +4,7 @@ use super::chart::Point;
 use super::control::{Control, Limits, Step, Tolerance, Tolerances};
 use super::stepper::{norm, Statistics, Stepper};
 use super::{EnergyProjection, StepError};
+use crate::error::is_before;
 use crate::system::{Energetic, Real, System};
 use crate::Scalar;
 
@@ -14,6 +15,8 @@ const SAFETY: f64 = 0.9;
 const ROUNDING: f64 = 4.0;
 /// Smallest step, s.
 const LEAST: f64 = 1e-15;
+/// Largest step, s: one towards an end at infinity is finite.
+const LARGEST: f64 = 1e12;
 /// A step changes by at most these factors.
 const SHRINK: f64 = 0.2;
 const GROW: f64 = 6.0;
@@ -67,7 +70,8 @@ where
     /// At time `t` (s) and a state. Methods that estimate no error take [`Step::Fixed`] only.
     ///
     /// # Errors
-    /// [`StepError::Quaternion`] if one is not of unit length, [`StepError::NoEstimate`].
+    /// [`StepError::Quaternion`] if one is not of unit length, [`StepError::NotFinite`] if a number of the state is not finite,
+    /// [`StepError::NoEstimate`], [`StepError::InvalidStep`], [`StepError::InvalidTolerances`].
     pub fn new(
         system: &mut Y,
         method: M,
@@ -76,8 +80,16 @@ where
         q: &Y::Coordinates,
         p: &Y::Momenta,
     ) -> Result<Self, StepError> {
-        if matches!(step, Step::Adaptive(_)) && method.error_order().is_none() {
-            return Err(StepError::NoEstimate { time: t.to_f64() });
+        let time = t.to_f64();
+        match step {
+            Step::Adaptive(_) if method.error_order().is_none() => return Err(StepError::NoEstimate { time }),
+            Step::Adaptive(tolerances) if !tolerances.control_errors() => {
+                return Err(StepError::InvalidTolerances { time });
+            }
+            Step::Fixed(step) if !(step > 0.0 && step.is_finite()) => {
+                return Err(StepError::InvalidStep { time, step });
+            }
+            _ => {}
         }
         let point = || Point::zero(system);
         let (scale, size, at) = (point(), point(), point());
@@ -106,7 +118,7 @@ where
     /// Starts again from another state, as a new solver would.
     ///
     /// # Errors
-    /// [`StepError::Quaternion`].
+    /// [`StepError::Quaternion`], [`StepError::NotFinite`].
     pub fn restart(
         &mut self,
         system: &mut Y,
@@ -122,7 +134,7 @@ where
     /// [`Solver::restart`], the largest momentum so far stays the measure of small ones.
     ///
     /// # Errors
-    /// [`StepError::Quaternion`].
+    /// [`StepError::Quaternion`], [`StepError::NotFinite`].
     pub fn resume(
         &mut self,
         system: &mut Y,
@@ -133,7 +145,13 @@ where
         self.cut += u64::from(self.pending.is_some());
         (self.t, self.t_carry, self.pending) = (t, Y::Scalar::zero(), None);
         (self.next, self.last_error) = (0.0, 1e-4);
-        self.method.begin(system, t, q, p)
+        self.method.begin(system, t, q, p)?;
+        // A coordinate on which no rate depends would stay what it is, without an error in any step.
+        self.method.parts().0.chart().size(system, &mut self.size);
+        match self.size.not_finite() {
+            Some(index) => Err(StepError::NotFinite { time: t.to_f64(), index }),
+            None => Ok(()),
+        }
     }
 
     /// Ends the last step early, at `t + θ h`: the state becomes that of the dense output there.
@@ -211,7 +229,7 @@ where
     /// [`StepError`]; the state is then that of the last accepted step.
     pub fn run(&mut self, system: &mut Y, t_end: Y::Scalar) -> Result<(), StepError> {
         let mut left = self.limits.steps;
-        while self.time() < t_end {
+        while is_before(self.time(), t_end)? {
             self.counted(system, t_end, &mut left)?;
         }
         Ok(())
@@ -229,9 +247,12 @@ where
     /// Takes one step, not beyond `t_end` (s); none if that is not ahead.
     ///
     /// # Errors
-    /// [`StepError`]; the state is then that of the last accepted step.
+    /// [`StepError`]; the state is then that of the last accepted step. [`StepError::InvalidEnd`] if `t_end` is not a number.
     pub fn advance(&mut self, system: &mut Y, t_end: Y::Scalar) -> Result<(), StepError> {
-        self.project_momenta(system)?;
+        self.accept_pending(system)?;
+        if !is_before(self.t, t_end)? {
+            return Ok(());
+        }
         // Where it is small against the time, this difference is exact. It is the step that ends exactly at the end.
         let rest = t_end - self.t - self.t_carry;
         if rest <= Y::Scalar::zero() {
@@ -244,9 +265,6 @@ where
     }
 
     fn fixed(&mut self, system: &mut Y, h: f64, t_end: Y::Scalar, rest: Y::Scalar) -> Result<(), StepError> {
-        if h.is_nan() || h <= 0.0 {
-            return Err(StepError::StepTooSmall { time: self.t.to_f64(), step: h, error: 0.0 });
-        }
         // A remainder that differs from the step by rounding only counts as one step.
         let slack = 1e-9 * h + 2.0 * Y::Scalar::epsilon() * t_end.to_f64().abs();
         let over = rest.to_f64() - h;
@@ -319,12 +337,14 @@ where
     }
 
     /// Accepts the pending step.
-    fn project_momenta(&mut self, system: &mut Y) -> Result<(), StepError> {
-        if let Some(step) = self.pending {
-            self.method.accept(system, self.t, step.h)?;
+    fn accept_pending(&mut self, system: &mut Y) -> Result<(), StepError> {
+        let Some(step) = self.pending else { return Ok(()) };
+        let accepted = self.method.accept(system, self.t, step.h);
+        if !matches!(accepted, Err(StepError::NotFinite { .. })) {
+            // The state has moved, even if the next step cannot be prepared.
             (self.t, self.t_carry, self.pending) = (step.end, step.carry, None);
         }
-        Ok(())
+        accepted
     }
 
     fn check(&mut self) -> Result<(), StepError> {
@@ -347,9 +367,9 @@ where
             self.next = self.first(system, &tolerances, exponent, rest);
         }
         let least = self.limits.min_step.max(4.0 * Y::Scalar::epsilon() * self.t.to_f64().abs()).max(LEAST);
-        let mut h = self.next.max(least).min(self.limits.max_step);
+        let mut h = self.next.max(least).min(self.limits.max_step).min(LARGEST);
         if h <= 0.0 {
-            return Err(StepError::StepTooSmall { time: self.t.to_f64(), step: h, error: 0.0 });
+            return Err(StepError::InvalidStep { time: self.t.to_f64(), step: h });
         }
         let mut rejected = false;
         loop {

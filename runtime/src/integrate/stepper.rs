@@ -98,7 +98,7 @@ where
     /// the next attempt.
     ///
     /// # Errors
-    /// [`StepError::NotFinite`]; the state has not moved then.
+    /// [`StepError::NotFinite`]: the state has not moved then. Any other error: it has, and the next attempt could not be prepared.
     fn accept(&mut self, system: &mut Y, t: Y::Scalar, h: Y::Scalar) -> Result<(), StepError>;
 
     /// As [`Stepper::accept`], for callers who call [`Stepper::begin`] before the next attempt: nothing is prepared for

@@ -230,15 +230,102 @@ fn limits_are_kept() {
     for h in [0.0, -1.0, f64::NAN] {
         let mut y = pendulum::<f64>();
         let method = Tsit5::new(&y);
-        let (q, p) = ([2.0], [0.0]);
-        let mut solver = Solver::new(&mut y, method, Step::Fixed(h), 0.0, &q, &p).expect("a start");
-        assert!(matches!(run(&mut solver, &mut y, 1.0), Err(StepError::StepTooSmall { .. })), "{h}");
+        let made = Solver::new(&mut y, method, Step::Fixed(h), 0.0, &[2.0], &[0.0]);
+        assert!(matches!(made, Err(StepError::InvalidStep { .. })), "{h}");
         let method = Tsit5::new(&y);
         let mut solver = adaptive(&mut y, method, 1e-6, (&[2.0], &[0.0]));
         solver.limits.max_step = h;
         let ended = run(&mut solver, &mut y, 1.0);
-        assert!(matches!(ended, Err(StepError::StepTooSmall { .. })) || h.is_nan(), "{h}: {ended:?}");
+        assert!(matches!(ended, Err(StepError::InvalidStep { .. })) || h.is_nan(), "{h}: {ended:?}");
     }
+}
+
+/// What says nothing, or what no motion can begin with, is an error, not a motion without error control.
+#[test]
+fn what_cannot_be_meant_is_refused() {
+    let start = |tolerances: Tolerances| {
+        let mut y = pendulum::<f64>();
+        let method = Verner9::new(&y);
+        Solver::new(&mut y, method, Step::Adaptive(tolerances), 1.0, &[2.0], &[0.0]).map(|_| ())
+    };
+    for tolerance in [0.0, -1e-9, f64::NAN] {
+        assert_eq!(start(Tolerances::new(tolerance)), Err(StepError::InvalidTolerances { time: 1.0 }), "{tolerance}");
+    }
+    let none = Tolerance { absolute: 0.0, relative: 0.0 };
+    let momenta_only = Tolerances { coordinates: none, rotations: 0.0, ..Tolerances::new(1e-9) };
+    assert_eq!(start(momenta_only), Ok(()));
+    assert_eq!(start(momenta_only.coordinates_only()), Err(StepError::InvalidTolerances { time: 1.0 }));
+
+    // A run to a time that is not a number takes no step.
+    let mut y = pendulum::<f64>();
+    let method = Verner9::new(&y);
+    let mut solver = adaptive(&mut y, method, 1e-9, (&[2.0], &[0.0]));
+    for _ in 0..2 {
+        assert_eq!(solver.run(&mut y, f64::NAN), Err(StepError::InvalidEnd { time: 0.0 }));
+        assert_eq!(solver.advance(&mut y, f64::NAN), Err(StepError::InvalidEnd { time: 0.0 }));
+    }
+
+    // A coordinate on which no rate depends is not a number.
+    let mut cart = Plain::new(|_, _: &[f64; 1], p: &[f64; 1]| (*p, [0.0]));
+    let method = Rk4::new(&cart);
+    let made = Solver::new(&mut cart, method, Step::Fixed(0.1), 0.0, &[f64::NAN], &[1.0]);
+    assert_eq!(made.err(), Some(StepError::NotFinite { time: 0.0, index: 0 }));
+}
+
+/// A step towards an end at infinity is finite, although nothing limits it where nothing moves.
+#[test]
+fn a_step_at_rest_ends() {
+    let mut y = pendulum::<f64>();
+    let method = Verner9::new(&y);
+    let mut solver = adaptive(&mut y, method, 1e-9, (&[0.0], &[0.0]));
+    for _ in 0..500 {
+        solver.advance(&mut y, f64::INFINITY).expect("a step");
+    }
+    assert!(solver.time().is_finite() && state(&mut solver, &y) == [0.0, 0.0]);
+}
+
+/// Cannot restart after half a second.
+struct BreaksDown;
+
+impl<Y: System<Scalar = f64>> PostStep<Y> for BreaksDown {
+    const RESTARTS: bool = true;
+
+    fn close(
+        &mut self,
+        _: &mut Y,
+        _: f64,
+        _: bool,
+        _: &mut Y::Coordinates,
+        _: &mut Y::Momenta,
+    ) -> Result<(), ConstraintError> {
+        Ok(())
+    }
+
+    fn restart(
+        &mut self,
+        _: &mut Y,
+        t: f64,
+        _: &mut Y::Coordinates,
+        _: &mut Y::Momenta,
+    ) -> Result<bool, ConstraintError> {
+        if t > 0.55 {
+            return Err(ConstraintError::NotFinite { index: 3 });
+        }
+        Ok(false)
+    }
+}
+
+/// Where a step has been accepted, and what follows cannot be prepared, the state is that at the end of the step.
+#[test]
+fn a_failure_after_a_step_leaves_its_end() {
+    let mut cart = Plain::new(|_, _: &[f64; 1], _: &[f64; 1]| ([1.0], [0.0]));
+    let method = WithPostStep::new(&cart, Rk4::new(&cart), BreaksDown);
+    let mut solver = Solver::new(&mut cart, method, Step::Fixed(0.1), 0.0, &[0.0], &[0.0]).expect("a start");
+    let failed = solver.run(&mut cart, 1.0);
+    assert!(matches!(failed, Err(StepError::Constraint { .. })), "{failed:?}");
+    // Six steps of a tenth of a second, at a speed of 1 m/s.
+    let q = state(&mut solver, &cart)[0];
+    assert!((solver.time() - 0.6).abs() < 1e-12 && (q - solver.time()).abs() < 1e-12, "{q} at {}", solver.time());
 }
 
 /// Refuses every end of a step.

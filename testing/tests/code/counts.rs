@@ -185,3 +185,22 @@ fn structure_pays() {
         assert!(counts.windows(2).all(|w| w[0] > w[1]), "seed {seed}: {counts:?}");
     }
 }
+
+/// Chains on both sides of a spherical joint are searched apart, although the part of the mechanism that consists of one, its
+/// ancestors and what is beyond it is the whole arm for both.
+#[test]
+fn chains_on_both_sides_of_a_spherical_joint_are_searched() {
+    let mut model = general_chain(3, 6);
+    model.joints[3].kind = JointKind::Spherical;
+    let chosen = search::best(Plan::new(&model, 0.0), PlanOptions::default());
+    let forms = |branch: [usize; 2]| {
+        let own = chosen.candidates.iter().filter(move |c| c.branch == branch);
+        own.map(|c| c.form.clone()).collect::<Vec<_>>()
+    };
+    // Three joints can be eliminated together, or two.
+    let together =
+        |forms: &[String], n: usize| forms.iter().any(|form| form.starts_with(&format!("last {n} together")));
+    let (inner, outer) = (forms([0, 2]), forms([4, 5]));
+    assert!(together(&inner, 3), "{inner:?}");
+    assert!(together(&outer, 2) && !together(&outer, 3), "{outer:?}");
+}

@@ -12,6 +12,7 @@ mod jams;
 mod known;
 mod models;
 mod pendulums;
+mod restarts;
 mod round;
 mod saltation;
 mod scene;

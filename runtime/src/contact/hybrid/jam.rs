@@ -93,8 +93,7 @@ where
         self.take_touching(system);
         self.fill_all(system);
         self.mind_near(system);
-        let touch = self.touching.order().iter().position(|k| *k == event.contact).unwrap_or_default();
-        let error = ContactError::Wedged { touch, pivot: 0.0 };
+        let error = ContactError::Wedged { touch: event.contact, pivot: 0.0 };
         let error = HybridError::Contact { time: t.to_f64(), error };
         let [_, tries @ ..] = &TRIES;
         self.jam(system, t, tries, Some(event), None, error)?;
@@ -183,6 +182,9 @@ where
                 (contact, most) = (k, force);
             }
         }
+        if left.is_some() && !(most > zero) {
+            return Err(error);
+        }
         let before = system.mode(contact);
         self.touching.take_closed(system);
         self.fill_all(system);
@@ -247,9 +249,10 @@ where
         let effort = self.rules.effort;
         let (problem, impulses, work) = self.touching.parts();
         impulses.fill(Y::Scalar::zero());
-        let certificate = solve(&problem, effort, impulses, work)
-            .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
-        let result = Impact { certificate, energy: energy(&problem, impulses), limited: None, rounds: 1 };
+        let solved = solve(&problem, effort, impulses, work);
+        let energy = energy(&problem, impulses);
+        let certificate = solved.map_err(|error| self.touching.error(t, error))?;
+        let result = Impact { certificate, energy, limited: None, rounds: 1 };
         self.touching.settles.as_mut().fill(false);
         for i in 0..self.touching.count {
             let (k, row) = (self.touching.contact(i), self.touching.touch(i).contact.row);

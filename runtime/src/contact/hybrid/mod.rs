@@ -20,8 +20,9 @@ use super::instant::Touches;
 #[cfg(doc)]
 use super::Way;
 use super::{Mode, RegimeChange, Touching, WithContacts};
+use crate::error::is_before;
 use crate::integrate::{Limits, Solver, Statistics, Step, Stepper};
-use crate::lists::get_or;
+use crate::lists::{copy, get_or};
 use crate::system::{Constrained, Real};
 use crate::Scalar;
 use jam::Crowd;
@@ -59,7 +60,8 @@ where
 
 /// Follows a motion with contacts.
 pub trait ContactObserver<Y: Touching> {
-    /// Called for every stretch of the motion between events.
+    /// Called for every stretch of the motion between events. Where the event at its end cannot be resolved, and a
+    /// [`ContactMotion`](super::ContactMotion) goes on by time steps, these begin where the stretch began.
     fn stretch(&mut self, _system: &mut WithContacts<Y>, _stretch: &mut dyn Stretch<Y>) {}
 
     /// Called for every event, after it was resolved.
@@ -107,8 +109,8 @@ pub struct Hybrid<Y: Touching, M> {
     end: Y::PerContact<Watched<Y::Scalar>>,
     /// Whether the left end is where the next step starts.
     known: bool,
-    /// What is left of each gap after the travel since it was looked at last, but for that of the joints' moves in `gone`, m
-    /// (rad); travel in the last step.
+    /// Lower bound of each gap: what it was when it was looked at last, less the most by which it can have closed since, m (rad). The
+    /// moves in `gone` are not taken off yet. By how much each can have closed in the last step.
     reserve: Y::PerContact<Y::Scalar>,
     travel: Y::PerContact<Y::Scalar>,
     /// How far the joints have moved beyond what was taken off the reserves, and how far they may before these are compared
@@ -123,8 +125,12 @@ pub struct Hybrid<Y: Touching, M> {
     touching: Touches<Y>,
     /// Contacts that are left open whatever their gaps are.
     ignored: Y::PerContact<bool>,
-    /// Modes before an event.
+    /// Modes before those that follow an event.
     before: Y::PerContact<Mode>,
+    /// Modes of the motion that came to the last event, and whether that event could not be resolved: these modes have been
+    /// taken back then, and what follows has to be found.
+    arrived: Y::PerContact<Mode>,
+    unresolved: bool,
     /// Acceleration with which a contact falls back whose bounces have become too small, m/s² (rad/s²); zero without one.
     settling: Y::Scalar,
     /// Largest acceleration with which a contact begins to slide, m/s²; zero where none does.
@@ -200,6 +206,8 @@ where
             touching: Touches::new(inner),
             ignored: inner.per_contact(false),
             before: inner.per_contact(Mode::Open),
+            arrived: inner.per_contact(Mode::Open),
+            unresolved: false,
             settling: zero,
             slipping: zero,
             immobile: false,
@@ -234,7 +242,21 @@ where
         q: &Y::Coordinates,
         p: &Y::Momenta,
     ) -> Result<(), HybridError> {
-        self.place(system, t, (q, p), 0.0)?;
+        self.solver.restart(system, t, q, p)?;
+        self.move_to(system, t, (q, p))
+    }
+
+    /// Goes on with the same motion from another state, with all contacts that do not touch there open.
+    ///
+    /// # Errors
+    /// [`HybridError`].
+    pub(in crate::contact) fn move_to(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        t: Y::Scalar,
+        state: (&Y::Coordinates, &Y::Momenta),
+    ) -> Result<(), HybridError> {
+        self.place(system, t, state, 0.0)?;
         self.settle_modes(system, t, None)
     }
 
@@ -247,7 +269,23 @@ where
         let t = self.solver.time();
         self.solver.state(system, &mut self.q, &mut self.p);
         system.look_at_all(t, &self.q, &self.p);
-        self.settle_modes(system, t, None)
+        self.settle(system, |hybrid, system| hybrid.settle_modes(system, t, None))
+    }
+
+    /// Finds by `find` what follows an event. Where it finds nothing, the modes are those before, and [`Hybrid::advance`] begins
+    /// with [`Hybrid::resume`].
+    fn settle<T>(
+        &mut self,
+        system: &mut WithContacts<Y>,
+        find: impl FnOnce(&mut Self, &mut WithContacts<Y>) -> Result<T, HybridError>,
+    ) -> Result<T, HybridError> {
+        copy(self.arrived.as_mut(), system.modes());
+        let found = find(self, system);
+        self.unresolved = found.is_err();
+        if self.unresolved {
+            system.take_back(self.arrived.as_ref());
+        }
+        found
     }
 
     /// Takes a state, with all contacts open; bodies may overlap by `overlap`, or by as much as motion by events begins with.
@@ -271,7 +309,11 @@ where
                 return Err(HybridError::Overlap { contact: k, gap });
             }
         }
-        self.departures.as_mut().fill(Departure { time: t, speed: Y::Scalar::zero() });
+        let zero = Y::Scalar::zero();
+        self.departures.as_mut().fill(Departure { time: t, speed: zero });
+        // Nothing is left of events that came before.
+        (self.crowd, self.forced, self.settling) = (Crowd::at(t), None, zero);
+        (self.unchanged, self.unresolved, self.immobile, self.rests) = (false, false, false, false);
         Ok(())
     }
 
@@ -330,7 +372,7 @@ where
         observer: &mut impl ContactObserver<Y>,
     ) -> Result<(), HybridError> {
         let mut left = self.solver.limits.steps;
-        while self.time() < t_end {
+        while is_before(self.time(), t_end)? {
             self.solver.limits.spend(&mut left, self.time().to_f64())?;
             self.advance(system, t_end, observer)?;
         }
@@ -347,6 +389,12 @@ where
         t_end: Y::Scalar,
         observer: &mut impl ContactObserver<Y>,
     ) -> Result<Option<ContactEvent<Y::Scalar>>, HybridError> {
+        if !is_before(self.time(), t_end)? {
+            return Ok(None);
+        }
+        if self.unresolved {
+            self.resume(system)?;
+        }
         let Hybrid { solver, start, .. } = self;
         start.0 = solver.time();
         let held = system.rows_act();
@@ -356,7 +404,7 @@ where
         }
         if let Err(error) = solver.advance(system, t_end) {
             solver.state(system, &mut start.1, &mut start.2);
-            return self.jam_at_start(system, error, observer).map(Some);
+            return self.settle(system, |hybrid, system| hybrid.jam_at_start(system, error, observer)).map(Some);
         }
         if let Some(steps) = self.statistics.steps.get_mut(system.system().way() as usize) {
             *steps += 1;
@@ -370,12 +418,13 @@ where
         };
         let t = self.go_to(system, &found)?;
         let switches = self.statistics.switches;
-        let event = self.resolve(system, t, &found)?;
+        let event = self.settle(system, |hybrid, system| hybrid.resolve(system, t, &found))?;
         if let Some(event) = &event {
             observer.event(system, event);
         }
         let changes = event.is_some_and(|event| event.impact.is_some()) || self.statistics.switches > switches;
-        Ok(self.jam_if_stuck(system, changes, observer)?.or(event))
+        let jam = self.settle(system, |hybrid, system| hybrid.jam_if_stuck(system, changes, observer))?;
+        Ok(jam.or(event))
     }
 
     /// Notes the state where the last step began, if [`Hybrid::advance`] has not: a step that is not searched needs none.

@@ -55,11 +55,12 @@ where
         }
         let own = !system.is_one_of_many(found.contact) || found.cause == Cause::Stopped;
         self.forced = own.then(|| (found.contact, found.cause, system.force(found.contact)));
-        match found.cause {
-            Cause::Jammed => self.jam_pulling(system, t, &mut event)?,
-            _ => self.settle_modes(system, t, Some(&mut event))?,
-        }
+        let settled = match found.cause {
+            Cause::Jammed => self.jam_pulling(system, t, &mut event),
+            _ => self.settle_modes(system, t, Some(&mut event)),
+        };
         self.forced = None;
+        settled?;
         event.modes = [before, system.mode(found.contact)];
         // Forces of redundant contacts may have been redistributed, and nothing else.
         let happened = event.impact.is_some() || event.cause == Cause::Stopped || self.statistics.switches > switches;
@@ -150,6 +151,7 @@ where
     ) -> Result<Option<Impact<Y::Scalar>>, HybridError> {
         let zero = Y::Scalar::zero();
         self.touching.settles.as_mut().fill(false);
+        self.settling = zero;
         let fastest = self.touching.order().iter().fold(zero, |most, &k| {
             let rate = -system.gap_rate(k);
             if rate > most {
@@ -178,10 +180,10 @@ where
         let (problem, impulses, work) = touching.parts();
         impulses.fill(zero);
         let options = ImpactOptions { effort: self.rules.effort, order: self.rules.order, ..ImpactOptions::default() };
-        let result = impact(&problem, &options, impulses, work)
-            .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
+        let result = impact(&problem, &options, impulses, work).map_err(|error| self.touching.error(t, error))?;
         if let Some(event) = event {
-            event.approach = -system.gap_rate(event.contact);
+            let approach = -system.gap_rate(event.contact);
+            event.approach = if approach > zero { approach } else { zero };
             event.rest = rest;
             event.impact = Some(result);
         }
@@ -210,7 +212,6 @@ where
     fn mark_settling(&mut self, system: &WithContacts<Y>, t: Y::Scalar) -> Option<Y::Scalar> {
         let (zero, one, two) = (Y::Scalar::zero(), Y::Scalar::one(), Y::Scalar::constant(2.0));
         let mut rest = None;
-        self.settling = zero;
         for i in 0..self.touching.count {
             let k = self.touching.contact(i);
             let Departure { time, speed } = get_or(self.departures.as_ref(), k, Departure { time: t, speed: zero });

@@ -34,9 +34,7 @@ where
         }
         self.set_slips(system);
         let Hybrid { touching, q, rules, .. } = self;
-        touching
-            .find_forces(system, t, q, rules.effort, false)
-            .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
+        touching.find_forces(system, t, q, rules.effort, false).map_err(|error| touching.error(t, error))?;
         self.read_modes();
         Ok(())
     }

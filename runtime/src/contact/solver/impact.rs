@@ -67,6 +67,7 @@ pub fn impact<S: Real>(
     work: &mut [S],
 ) -> Result<Impact<S>, ContactError> {
     fits(problem, impulses, work)?;
+    finite(problem)?;
     impulses.fill(S::zero());
     let mut result = Impact::none();
     if options.order == ImpactOrder::Sequential {
@@ -247,18 +248,18 @@ fn sequential<S: Real>(problem: &Problem<S>, effort: Effort, impulses: &mut [S])
     let most = COLLISIONS.saturating_mul(problem.touches.len() as u32);
     for collisions in 0..most {
         let mut next = (slow, None);
-        for touch in problem.touches {
+        for (place, touch) in problem.touches.iter().enumerate() {
             let approach = -velocity(problem, touch.contact.row, impulses);
             if approach > next.0 {
-                next = (approach, Some(touch));
+                next = (approach, Some((place, touch)));
             }
         }
-        let Some(touch) = next.1 else { return Ok(collisions) };
+        let Some((place, touch)) = next.1 else { return Ok(collisions) };
         let (row, rows) = (touch.contact.row, touch.contact.rows());
         let mut block = Block::of(&alone(problem), touch, impulses);
         let own: [S; 3] = core::array::from_fn(|k| if k < rows { get(impulses, row + k) } else { zero });
         block.q = block.velocity(own);
-        let found = routh::collide(&block, &touch.contact)?;
+        let found = routh::collide(&block, &touch.contact).map_err(|error| error.at(|_| place))?;
         for (p, more) in part_mut(impulses, row, rows).iter_mut().zip(found) {
             *p = *p + more;
         }

@@ -99,7 +99,8 @@ pub struct Certificate<S> {
 pub enum ContactError {
     /// The iteration did not reach the tolerance.
     NoConvergence {
-        /// The contact with the largest residual, by its place in the problem.
+        /// The contact with the largest residual, by its place in the problem; by its number in the mechanism where a
+        /// [`HybridError`](super::HybridError) has this error.
         touch: usize,
         /// Its relative residual.
         residual: f64,
@@ -108,7 +109,8 @@ pub enum ContactError {
     },
     /// Friction wedges a contact that slides: pressing it together makes its bodies approach faster (Painlevé).
     Wedged {
-        /// The contact, by its place in the problem.
+        /// The contact, by its place in the problem; by its number in the mechanism where a
+        /// [`HybridError`](super::HybridError) has this error.
         touch: usize,
         /// Acceleration of the gap for a unit normal force, zero or negative, 1/kg.
         pivot: f64,
@@ -127,16 +129,29 @@ pub enum ContactError {
     Lengths,
 }
 
+impl ContactError {
+    /// The same error with another number for its contact, of which `number` is told the present one.
+    pub(in crate::contact) fn at(self, number: impl FnOnce(usize) -> usize) -> Self {
+        match self {
+            ContactError::NoConvergence { touch, residual, sweeps } => {
+                ContactError::NoConvergence { touch: number(touch), residual, sweeps }
+            }
+            ContactError::Wedged { touch, pivot } => ContactError::Wedged { touch: number(touch), pivot },
+            other => other,
+        }
+    }
+}
+
 impl core::fmt::Display for ContactError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             ContactError::NoConvergence { touch, residual, sweeps } => write!(
                 f,
-                "the impulses of the contacts have a relative residual of {residual:.1e} at touching contact {touch} after {sweeps} sweeps: allow more rounds, or reduce friction or mass ratios"
+                "the impulses of the contacts have a relative residual of {residual:.1e} at contact {touch} after {sweeps} sweeps: allow more rounds, or reduce friction or mass ratios"
             ),
             ContactError::Wedged { touch, pivot } => write!(
                 f,
-                "friction wedges touching contact {touch} while it slides (its gap accelerates by {pivot:.1e} for a unit normal force): reduce the friction"
+                "friction wedges contact {touch} while it slides (its gap accelerates by {pivot:.1e} for a unit normal force): reduce the friction"
             ),
             ContactError::NoEnd { collisions } => write!(
                 f,

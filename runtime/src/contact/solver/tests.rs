@@ -518,3 +518,27 @@ fn impacts_of_corners_that_are_off_by_rounding_are_solved() {
     // Corners that hold cannot follow each other to the last digit, and slide by less than can be solved for.
     assert!(failed == 0 && beyond > 0 && most <= 1e-9, "{failed} {beyond} {most:e}");
 }
+
+/// Inertias so small that impulses are infinite, and velocities that are not numbers, are errors on every way.
+#[test]
+fn what_is_not_finite_is_an_error() {
+    let frictionless = |row, restitution| {
+        let contact = Contact { row, tangents: false, friction: 0.0, restitution, law: RestitutionLaw::Poisson };
+        Touch { contact, slip: None }
+    };
+    let tiny = 1e-320;
+    let infinite = Case {
+        a: vec![tiny, -tiny, -tiny, tiny],
+        b: vec![-1.0, -1.0],
+        touches: vec![frictionless(0, 0.0), frictionless(1, 0.0)],
+    };
+    assert!(infinite.impact(&ImpactOptions::default()).is_err());
+    for order in [ImpactOrder::Simultaneous, ImpactOrder::Sequential] {
+        for restitution in [0.0, 0.5] {
+            let unknown = Case { a: vec![1.0], b: vec![f64::NAN], touches: vec![frictionless(0, restitution)] };
+            let options = ImpactOptions { order, ..ImpactOptions::default() };
+            let result = unknown.impact(&options).map(|_| ());
+            assert_eq!(result, Err(ContactError::NotFinite), "{order:?} {restitution}");
+        }
+    }
+}

@@ -16,9 +16,9 @@ use crate::Scalar;
 
 /// Ways among which is chosen how far contacts are left out, in steps like the last one.
 const HORIZONS: [u32; 9] = [6, 8, 12, 16, 32, 64, 128, 256, 1024];
-/// How many times the way of a step has to be left over.
+/// A gap is far where it lasts for so many more steps like the last one than it is left out for.
 const SPARE: u32 = 4;
-/// How many times the way of what closes has to be left over, for what its impulses might close.
+/// A gap is left over as well for what the impulses of others might close: so many times as much as the fastest closes in a step.
 const MARGIN: f64 = 2.0;
 /// Number of steps in which all contacts are looked at where leaving some out saves nothing.
 const PAUSE: u32 = 16;

@@ -175,7 +175,7 @@ where
         LastTimeStep { stepping: self, q, p }
     }
 
-    /// Takes a step of `h` s from time `t` (s).
+    /// Takes a step of `h` s, which is greater than zero, from time `t` (s).
     ///
     /// # Errors
     /// [`HybridError`]; the state is then as it was.
@@ -187,6 +187,9 @@ where
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,
     ) -> Result<(), HybridError> {
+        if !(h > Y::Scalar::zero() && h.is_finite()) {
+            return Err(StepError::InvalidStep { time: t.to_f64(), step: h.to_f64() }.into());
+        }
         match self.whole(system, t, h, q, p) {
             Err(error) if I::DIVIDES && unconverged(&error) => self.divided(system, (t, h), (q, p))?,
             result => result?,
@@ -279,8 +282,7 @@ where
             copy(part_mut(touching.impulses.as_mut(), c.row, c.rows()), &last);
         }
         let (problem, impulses, work) = touching.parts();
-        let result = I::find(&self.rules, &problem, impulses, work)
-            .map_err(|error| HybridError::Contact { time: t.to_f64(), error })?;
+        let result = I::find(&self.rules, &problem, impulses, work).map_err(|error| touching.error(t, error))?;
         // The work of the impulses: less than that with the velocities that were asked for, by what is still to be closed.
         let ahead = first(touching.order.as_ref(), touching.count).iter().zip(touching.problem.as_ref());
         let shift = ahead.fold(Y::Scalar::zero(), |sum, (k, touch)| {
@@ -305,17 +307,20 @@ where
             }
         }
         self.last_impulses.as_mut().fill([Y::Scalar::zero(); 3]);
+        let mut pressed = 0;
         for (k, touch) in first(touching.order.as_ref(), touching.count).iter().zip(touching.problem.as_ref()) {
             let own = part(touching.impulses.as_ref(), touch.contact.row, touch.contact.rows());
             let mut impulse = [Y::Scalar::zero(); 3];
             copy(&mut impulse, own);
             set(self.last_impulses.as_mut(), *k, impulse);
-            set(self.pressed[1].as_mut(), *k, impulse[0] > Y::Scalar::zero());
+            let presses = impulse[0] > Y::Scalar::zero();
+            set(self.pressed[1].as_mut(), *k, presses);
+            pressed += u32::from(presses);
         }
         let s = &mut self.statistics;
         s.touched += 1;
         s.limited += u64::from(result.limited.is_some());
-        s.most = s.most.max(touching.count as u32);
+        s.most = s.most.max(pressed);
         s.lost = s.lost - (result.energy - shift);
         s.residual = larger(s.residual, result.certificate.residual);
         Ok(())

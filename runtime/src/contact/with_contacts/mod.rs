@@ -175,7 +175,8 @@ impl<Y: Touching> WithContacts<Y> {
     }
 
     /// Forces of the contacts `[normal, tangential, tangential]`, N (N m for stops of rotations), at a state: on the second
-    /// body, the opposite on the first.
+    /// body, the opposite on the first. The two tangential directions form a right-handed triple with the normal and turn with the
+    /// first body; they are along no axis of it.
     pub fn forces(&mut self, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> &[[Y::Scalar; 3]] {
         self.look_at_closed(t, q, p);
         self.loads(t, q, true);
@@ -187,6 +188,13 @@ impl<Y: Touching> WithContacts<Y> {
         copy(self.modes.as_mut(), found.modes.as_ref());
         copy(self.slip.as_mut(), found.slip.as_ref());
         copy(self.begins.as_mut(), found.begins.as_ref());
+        self.modes_are_set();
+    }
+
+    /// Sets modes that were there before, none of which begins to slide.
+    pub(super) fn take_back(&mut self, modes: &[Mode]) {
+        copy(self.modes.as_mut(), modes);
+        self.begins.as_mut().fill(false);
         self.modes_are_set();
     }
 
