@@ -77,6 +77,9 @@ pub struct Compiled<S: Number = f64> {
     pub(super) drives: Option<Arc<dyn super::Drives<S>>>,
 }
 
+/// Number of sets of rows above which those that nobody uses are forgotten, with their code.
+const REDUCED: usize = 256;
+
 /// What all clones have in common.
 #[derive(Debug)]
 pub(super) struct Shared<S> {
@@ -466,6 +469,9 @@ impl<S: Number> Compiled<S> {
         let Shared { plan, options, sizes, reduced, .. } = &*self.shared;
         let make = || Arc::new(Shared::new(plan.acting(acts), options.clone(), *sizes).with_early_rows());
         let mut reduced = reduced.lock().unwrap_or_else(PoisonError::into_inner);
+        if reduced.len() >= REDUCED && !reduced.contains_key(acts) {
+            reduced.retain(|_, shared| Arc::strong_count(shared) > 1);
+        }
         let shared = reduced.entry(acts.to_vec()).or_insert_with(make).clone();
         let (interpreter, calls) = (self.current().acting(acts), vec![0; self.calls.len()]);
         Compiled { shared, planned: None, interpreter, outdated: false, calls, ..self.clone() }

@@ -120,15 +120,23 @@ impl<S: Real> Reducible for Interpreter<S> {
     }
 }
 
-/// A mechanism with contacts. An evaluator of the rows that act is made when a set of modes is first met, and kept.
+/// What the evaluators that are kept take together at most, bytes; and their least and largest number.
+const MEMORY: usize = 256 << 20;
+const NUMBER: [usize; 2] = [32, 4096];
+
+/// A mechanism with contacts. An evaluator of the rows that act is made when a set of modes is met, and kept, as long as there is
+/// room: of many with many rows, the one goes that has not been used for longest.
 ///
 /// It dereferences to the evaluator that is in use, whose inputs are handed over when modes change.
 #[derive(Clone, Debug)]
 pub struct ModeTable<Y: Constrained> {
     /// All rows act: for gaps.
     full: Y,
-    modes: Vec<(Vec<Mode>, Y)>,
+    kept: Vec<Kept<Y>>,
     current: usize,
+    /// Largest number of evaluators that are kept, and how often one was put to use.
+    most: usize,
+    uses: u64,
     contacts: Vec<Contact<Y::Scalar>>,
     reaches: Vec<Reach<Y::Scalar>>,
     /// The rows of [`Touching::gaps_of`].
@@ -140,6 +148,15 @@ pub struct ModeTable<Y: Constrained> {
     /// Memory for these.
     spare: ([Y::Momenta; 2], Y::Rows),
     implicit: Option<Implicit<Y>>,
+}
+
+/// The evaluator of a set of modes.
+#[derive(Clone, Debug)]
+struct Kept<Y> {
+    modes: Vec<Mode>,
+    evaluator: Y,
+    /// Number of its last use.
+    used: u64,
 }
 
 /// A mechanism for time steps that are implicit in springs and dampers, with all contacts open.
@@ -164,9 +181,14 @@ impl<Y: Reducible> ModeTable<Y> {
         let first = full.acting(&rows_that_act(full.rows().len(), &contacts, &open));
         let (reaches, wanted) = (full.reaches(&contacts), vec![true; full.rows().len()]);
         let (trees, trees_of) = beside::trees(&full, &contacts);
+        // The columns and screws of all rows at all bodies with the products of each two rows, and those of the mass matrix.
+        let (rows, nv) = (full.rows().len(), full.zero_momenta().as_ref().len());
+        let each = core::mem::size_of::<Y::Scalar>() * (rows * (rows + 13 * nv) + 6 * nv * nv);
         ModeTable {
-            modes: vec![(open, first)],
+            kept: vec![Kept { modes: open, evaluator: first, used: 0 }],
             current: 0,
+            most: MEMORY.checked_div(each).unwrap_or(NUMBER[1]).clamp(NUMBER[0], NUMBER[1]),
+            uses: 0,
             reaches,
             wanted,
             trees,
@@ -179,14 +201,31 @@ impl<Y: Reducible> ModeTable<Y> {
         }
     }
 
-    /// The sets of modes that were met, in the order in which they were.
+    /// The sets of modes whose evaluators are kept, in no order.
     pub fn sets_of_modes(&self) -> impl ExactSizeIterator<Item = &[Mode]> {
-        self.modes.iter().map(|(modes, _)| modes.as_slice())
+        self.kept.iter().map(|kept| kept.modes.as_slice())
     }
 
-    /// The evaluators of the sets of modes that were met.
+    /// The evaluators that are kept.
     pub fn evaluators_mut(&mut self) -> impl Iterator<Item = &mut Y> {
-        self.modes.iter_mut().map(|(_, evaluator)| evaluator)
+        self.kept.iter_mut().map(|kept| &mut kept.evaluator)
+    }
+
+    /// The place of the evaluator for these modes, which is made if it is not kept.
+    fn place_of(&mut self, modes: &[Mode]) -> usize {
+        if let Some(place) = self.kept.iter().position(|kept| kept.modes == modes) {
+            return place;
+        }
+        let evaluator = self.full.acting(&rows_that_act(self.full.rows().len(), &self.contacts, modes));
+        let made = Kept { modes: modes.to_vec(), evaluator, used: 0 };
+        if self.kept.len() < self.most {
+            self.kept.push(made);
+            return self.kept.len() - 1;
+        }
+        // That in use was used last.
+        let oldest = self.kept.iter().enumerate().min_by_key(|(_, kept)| kept.used).map_or(0, |(place, _)| place);
+        self.kept[oldest] = made;
+        oldest
     }
 
     /// Sets the contacts' coefficient of friction, where they have tangential rows.
@@ -203,13 +242,13 @@ impl<Y: Reducible> ModeTable<Y> {
 impl<Y: Constrained> Deref for ModeTable<Y> {
     type Target = Y;
     fn deref(&self) -> &Y {
-        &self.modes[self.current].1
+        &self.kept[self.current].evaluator
     }
 }
 
 impl<Y: Constrained> DerefMut for ModeTable<Y> {
     fn deref_mut(&mut self) -> &mut Y {
-        &mut self.modes[self.current].1
+        &mut self.kept[self.current].evaluator
     }
 }
 
@@ -342,23 +381,16 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
 
     fn act(&mut self, modes: &[Mode]) {
         let before = self.current;
-        if self.modes[before].0 == modes {
+        if self.kept[before].modes == modes {
             return;
         }
-        self.current = match self.modes.iter().position(|(known, _)| known == modes) {
-            Some(k) => k,
-            None => {
-                let made = self.full.acting(&rows_that_act(self.full.rows().len(), &self.contacts, modes));
-                self.modes.push((modes.to_vec(), made));
-                self.modes.len() - 1
-            }
-        };
-        if self.current != before {
-            let (low, high) = (before.min(self.current), before.max(self.current));
-            let (first, rest) = self.modes.split_at_mut(high);
-            let [a, b] = [&mut first[low].1, &mut rest[0].1];
-            a.swap_inputs(b);
-        }
+        let next = self.place_of(modes);
+        self.uses += 1;
+        self.kept[next].used = self.uses;
+        self.current = next;
+        let (low, high) = (before.min(next), before.max(next));
+        let (first, rest) = self.kept.split_at_mut(high);
+        first[low].evaluator.swap_inputs(&mut rest[0].evaluator);
     }
 
     fn gaps(
@@ -370,7 +402,7 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
         velocities: &mut Y::Rows,
         entries: &mut Y::Entries,
     ) {
-        let current = &mut self.modes[self.current].1;
+        let current = &mut self.kept[self.current].evaluator;
         self.full.swap_inputs(current);
         self.full.gaps(q, v, gaps, velocities, entries);
         self.full.swap_inputs(current);
@@ -392,24 +424,24 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
         if !of.contains(&false) && !whole.contains(&false) {
             return self.gaps(t, q, v, gaps, velocities, entries);
         }
-        let ModeTable { full, modes, current, contacts, wanted, .. } = self;
+        let ModeTable { full, kept, current, contacts, wanted, .. } = self;
         for (contact, (of, whole)) in contacts.iter().zip(of.iter().zip(whole)) {
             wanted[contact.row..][..contact.rows()].fill(*of && *whole);
             wanted[contact.row] = *of;
         }
-        let current = &mut modes[*current].1;
+        let current = &mut kept[*current].evaluator;
         full.swap_inputs(current);
         full.gaps_of(wanted, (q, v), gaps, velocities, entries);
         full.swap_inputs(current);
     }
 
     fn project_columns(&mut self, t: Y::Scalar, q: &Y::Coordinates, columns: &mut Columns<Y::Scalar>) -> bool {
-        let ModeTable { full, modes, current, contacts, trees, trees_of, solved, spare, .. } = self;
+        let ModeTable { full, kept, current, contacts, trees, trees_of, solved, spare, .. } = self;
         let (rows, entries) = (full.rows(), full.entry_columns());
         columns.merge(contacts, trees_of, solved);
         let shared = Shared { lines: solved, trees };
         let mut of = columns.of(contacts, rows, entries, shared);
-        let current = &mut modes[*current].1;
+        let current = &mut kept[*current].evaluator;
         if current.project_several(t, q, &mut of) {
             return true;
         }
@@ -438,7 +470,7 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
             return;
         };
         let ImplicitSprings { evaluator, added, driven, .. } = springs;
-        let current = &mut self.modes[self.current].1;
+        let current = &mut self.kept[self.current].evaluator;
         evaluator.swap_inputs(current);
         evaluator.project_momenta(t, q, p, v, sigma);
         if *driven {
@@ -463,10 +495,10 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
     }
 
     fn project_columns_implicitly(&mut self, t: Y::Scalar, q: &Y::Coordinates, columns: &mut Columns<Y::Scalar>) {
-        let ModeTable { full, modes, current, contacts, implicit, trees, trees_of, solved, .. } = self;
+        let ModeTable { full, kept, current, contacts, implicit, trees, trees_of, solved, .. } = self;
         let Some(Implicit { springs: Some(springs), rest: [p, v], sigma, .. }) = implicit else { return };
         let ImplicitSprings { evaluator, .. } = springs;
-        let current = &mut modes[*current].1;
+        let current = &mut kept[*current].evaluator;
         evaluator.swap_inputs(current);
         columns.merge(contacts, trees_of, solved);
         let mut of = columns.of(contacts, full.rows(), full.entry_columns(), Shared { lines: solved, trees });

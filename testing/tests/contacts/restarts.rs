@@ -1,10 +1,12 @@
-//! Motions that start again, and motions that go on after an error.
+//! Motions that start again, motions that go on after an error, and what is kept of sets of modes.
 
-use mbd_runtime::contact::{Effort, HybridError};
+use mbd_codegen::plan::Plan;
+use mbd_runtime::contact::{Effort, HybridError, Mode, Touching};
 use mbd_runtime::integrate::StepError;
+use mbd_runtime::Constrained;
 
 use super::known::{ball, free_box};
-use super::scene::{apart, Scene};
+use super::scene::{apart, Mechanism, Scene};
 
 /// The bits of a state.
 fn bits(scene: &Scene) -> Vec<u64> {
@@ -67,4 +69,38 @@ fn ends_that_are_not_ahead_take_no_step() {
     scene.run(0.05);
     scene.advance(0.05);
     assert_eq!((bits(&scene), scene.motion.as_ref().unwrap().time()), (here, 0.1));
+}
+
+/// A mechanism that visits many sets of modes forgets those that it has not used for longest. What it computes is the same, and its
+/// inputs stay: a box of eight contacts has 6,561 sets.
+#[test]
+fn many_sets_of_modes_are_not_all_kept() {
+    let plan = Plan::new(&free_box(0.5, 0.0), 1e-9);
+    let new = || -> Mechanism { plan.default_contact_interpreter() };
+    let sets = (0..6561).map(|set: u32| {
+        let mode = |k: u32| [Mode::Open, Mode::Slide, Mode::Stick][(set / 3_u32.pow(k) % 3) as usize];
+        (0..8).map(mode).collect::<Vec<_>>()
+    });
+    let sets: Vec<Vec<Mode>> = sets.collect();
+    let (q, v) = (vec![0.1, 0.2, 0.3, 0.0, 0.0, 0.6, 0.8], vec![0.3, -0.2, 0.1, 0.4, 0.5, -0.6]);
+    let multipliers = |mechanism: &mut Mechanism, modes: &[Mode]| {
+        mechanism.act(modes);
+        let mut lambda = mechanism.zero_rows();
+        Constrained::multipliers(mechanism, 0.0, &q, &v, &mut lambda);
+        lambda
+    };
+    let mut table = new();
+    table.tau[1] = 2.0;
+    for modes in &sets {
+        table.act(modes);
+    }
+    assert_eq!(table.sets_of_modes().len(), 4096);
+    for modes in [&sets[1], &sets[40], &sets[6000]] {
+        let mut fresh = new();
+        fresh.tau[1] = 2.0;
+        let expected = multipliers(&mut fresh, modes);
+        assert!(expected.iter().any(|x| *x != 0.0));
+        assert_eq!(multipliers(&mut table, modes), expected, "{modes:?}");
+    }
+    assert_eq!(table.sets_of_modes().len(), 4096);
 }
