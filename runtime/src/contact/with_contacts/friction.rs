@@ -3,9 +3,10 @@
 use super::WithContacts;
 use crate::contact::assembly::lines;
 use crate::contact::instant::Touches;
+use crate::contact::solver::{factor, solve_factored};
 use crate::contact::touching::add_row;
 use crate::contact::{Effort, Mode, Touching};
-use crate::lists::{first, get, largest, set};
+use crate::lists::{first, first_mut, get, largest, set, split};
 use crate::system::Real;
 use crate::Scalar;
 
@@ -150,9 +151,8 @@ impl<Y: Touching> WithContacts<Y> {
             return;
         }
         self.system.multipliers(t, q, &self.at.v, &mut self.at.lambda);
-        let count = self.modes.as_ref().len();
         if self.rubs {
-            self.normal_forces(t, q, count);
+            self.normal_forces(t, q);
         }
         if self.rubs && all {
             self.respond(t, q, false);
@@ -160,7 +160,7 @@ impl<Y: Touching> WithContacts<Y> {
                 *lambda = *lambda + *sigma;
             }
         }
-        for k in 0..count {
+        for k in 0..self.modes.as_ref().len() {
             let c = self.contact(k);
             let lambda = self.at.lambda.as_ref();
             let own = |row: usize, acts: bool| if acts { -get(lambda, row) } else { zero };
@@ -170,7 +170,7 @@ impl<Y: Touching> WithContacts<Y> {
                 *force = own(c.row + i, mode.acts(i));
             }
             if self.rubs(k) {
-                let normal = if all { force[0] } else { get(self.table.as_ref(), k * (count + 1) + count) };
+                let normal = if all { force[0] } else { get(self.normals.as_ref(), k) };
                 let [a, b] = self.direction(k);
                 force = [normal, -(c.friction * normal * a), -(c.friction * normal * b)];
             }
@@ -215,66 +215,61 @@ impl<Y: Touching> WithContacts<Y> {
         self.answer(t, q);
     }
 
-    /// Normal forces `N` of the contacts that rub, from `N − R N = N₀`, and their friction in total.
-    fn normal_forces(&mut self, t: Y::Scalar, q: &Y::Coordinates, count: usize) {
-        let (one, width) = (Y::Scalar::one(), count + 1);
+    /// The contacts that rub.
+    fn rubbing(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.modes.as_ref().len()).filter(|k| self.rubs(*k))
+    }
+
+    /// Normal forces `N` of the contacts that rub, in [`WithContacts::normals`], from `N − R N = N₀`, and their friction in total.
+    /// `R` has the normal forces of each as it answers to the friction of others.
+    fn normal_forces(&mut self, t: Y::Scalar, q: &Y::Coordinates) {
+        let (zero, one) = (Y::Scalar::zero(), Y::Scalar::one());
+        let (count, n) = (self.modes.as_ref().len(), self.rubbing().count());
+        let mut column = 0;
         for k in 0..count {
             if !self.rubs(k) {
                 continue;
             }
             self.unit_friction(k);
             self.respond(t, q, true);
+            let mut row = 0;
             for j in 0..count {
                 if !self.rubs(j) {
                     continue;
                 }
+                let own = if j == k { one } else { zero };
                 let response = -get(self.sigma.as_ref(), self.contact(j).row);
-                set(self.table.as_mut(), j * width + k, if j == k { one - response } else { -response });
+                set(self.table.as_mut(), row * n + column, own - response);
+                row += 1;
             }
             let free = -get(self.at.lambda.as_ref(), self.contact(k).row);
-            set(self.table.as_mut(), k * width + count, free);
+            set(self.normals.as_mut(), column, free);
+            column += 1;
         }
-        self.eliminate(count);
-        for k in 0..count {
-            if self.rubs(k) {
+        let (matrix, exchanged) = split(self.table.as_mut(), n * n);
+        let (exchanged, normals) = (first_mut(exchanged, n), first_mut(self.normals.as_mut(), n));
+        if !factor(matrix, exchanged) {
+            // No forces are consistent: the step that asks for them is refused.
+            normals.fill(Y::Scalar::constant(f64::NAN));
+        }
+        solve_factored(matrix, exchanged, normals);
+        for (i, normal) in normals.iter().enumerate() {
+            // The pivot is a difference of numbers near one.
+            let error = Y::Scalar::epsilon() * (*normal / get(matrix, i * n + i)).to_f64().abs();
+            self.rounding = self.rounding.max(error);
+        }
+        // Behind the contacts that rub, all others have none: each goes to its own place, the last first.
+        let mut place = n;
+        for k in (0..count).rev() {
+            let rubs = self.rubs(k);
+            place -= usize::from(rubs);
+            let normal = if rubs { get(self.normals.as_ref(), place) } else { zero };
+            set(self.normals.as_mut(), k, normal);
+            if rubs {
                 self.unit_friction(k);
-                let normal = get(self.table.as_ref(), k * width + count);
                 for (sum, unit) in self.friction.as_mut().iter_mut().zip(self.unit.as_ref()) {
                     *sum = *sum + normal * *unit;
                 }
-            }
-        }
-    }
-
-    /// Solves the system of [`WithContacts::normal_forces`] among the contacts that rub. Notes the largest rounding error.
-    fn eliminate(&mut self, count: usize) {
-        let width = count + 1;
-        for k in 0..count {
-            if !self.rubs(k) {
-                continue;
-            }
-            let pivot = get(self.table.as_ref(), k * width + k);
-            for j in 0..count {
-                if j == k || !self.rubs(j) {
-                    continue;
-                }
-                let table = self.table.as_mut();
-                let factor = get(table, j * width + k) / pivot;
-                for i in k..width {
-                    let left = get(table, j * width + i) - factor * get(table, k * width + i);
-                    set(table, j * width + i, left);
-                }
-            }
-        }
-        for k in 0..count {
-            if self.rubs(k) {
-                let table = self.table.as_mut();
-                let pivot = get(table, k * width + k);
-                let normal = get(table, k * width + count) / pivot;
-                set(table, k * width + count, normal);
-                // The pivot is a difference of numbers near one.
-                let error = Y::Scalar::epsilon() * (normal / pivot).to_f64().abs();
-                self.rounding = self.rounding.max(error);
             }
         }
     }

@@ -60,6 +60,9 @@ pub struct WithContacts<Y: Touching> {
     /// Friction on the joints for normal forces of 1 N, and in total.
     pub(super) unit: Y::Momenta,
     friction: Y::Momenta,
+    /// Normal force of each contact that slides with friction, zero for others, N.
+    normals: Y::PerContact<Y::Scalar>,
+    /// Memory for these forces.
     table: Y::Delassus,
 }
 
@@ -119,6 +122,7 @@ impl<Y: Touching> WithContacts<Y> {
             sigma: rows(&system),
             unit: momenta(&system),
             friction: momenta(&system),
+            normals: system.per_contact(zero),
             table: system.zero_delassus(count * (count + 1)),
             system,
         }
