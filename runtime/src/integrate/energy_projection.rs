@@ -67,8 +67,10 @@ where
                 first = off;
             }
             let factor = off / square;
-            // At rest in an equilibrium the gradient is zero: there is no direction to move in.
-            if !factor.is_finite() {
+            // What rounding errors of the energies leave says nothing. At rest in an equilibrium the gradient is zero: there is no
+            // direction to move in.
+            let noise = Y::Scalar::constant(2.0 * Y::Scalar::epsilon()) * (kinetic.abs() + potential.abs());
+            if !(off.abs() > noise && factor.is_finite()) {
                 break;
             }
             delta.add(-factor, &self.gradient);

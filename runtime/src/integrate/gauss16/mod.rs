@@ -24,6 +24,7 @@ mod kernels;
 use super::chart::{Chart, Point};
 use super::in_lanes::InLanes;
 use super::integrator::{Attempt, FromSystem, Integrator, Scheme};
+use super::stepper::hermite;
 use super::StepError;
 use crate::kernel::call_lanes;
 use crate::system::{Real, System};
@@ -406,7 +407,12 @@ where
             return out.clear();
         }
         self.predict(system, theta * h);
-        self.converge(step, system, t, theta * h, Pace::Fixed);
-        self.displace(theta * h, out);
+        if self.converge(step, system, t, theta * h, Pace::Fixed).converged {
+            return self.displace(theta * h, out);
+        }
+        // The cubic through both ends and their rates, as of other methods.
+        self.start_rate(step, system, t);
+        step.end_rate(system, t, h);
+        hermite(h, theta, &step.delta, [self.start(), &step.end], out);
     }
 }

@@ -84,6 +84,27 @@ fn projection_keeps_the_energy() {
     }
 }
 
+/// A motion whose energy is below the rounding error of the potential energy is left as it is: what is off is that error.
+#[test]
+fn projection_leaves_small_motions_alone() {
+    let run = |projected: bool| {
+        let (mut y, mut q, mut p) = pendulum::<f64>();
+        q.fill(0.0);
+        p.fill(0.0);
+        q[0] = 1e-9;
+        let (mut method, mut projection) = (Rk4::new(&y), EnergyProjection::new(&mut y, &q, &p, 2));
+        for _ in 0..1000 {
+            match projected {
+                true => projection.step(&mut method, &mut y, 0.0, 0.01, &mut q, &mut p).unwrap(),
+                false => method.step(&mut y, 0.0, 0.01, &mut q, &mut p).unwrap(),
+            }
+        }
+        q[0]
+    };
+    let [with, without] = [true, false].map(run);
+    assert!(without.abs() > 1e-11 && (with - without).abs() < 1e-12, "{with:e} {without:e}");
+}
+
 #[test]
 fn projection_costs_no_evaluation() {
     let (mut y, mut q, mut p) = pendulum::<f64>();
