@@ -8,7 +8,6 @@ mod assembly;
 #[cfg(feature = "alloc")]
 mod beside;
 mod derivatives;
-mod fall;
 mod hybrid;
 mod instant;
 #[cfg(feature = "alloc")]

@@ -96,6 +96,16 @@ struct Process<S> {
     work: S,
 }
 
+/// Force for each unit of the normal impulse where the bodies slip in a direction.
+fn sliding_force<S: Real>(friction: S, [x, y]: [S; 2]) -> [S; 3] {
+    [S::one(), -(friction * x), -(friction * y)]
+}
+
+/// Rate of the velocities, with the inverse inertia `w`, under a force for each unit of the normal impulse.
+fn rate<S: Real>(w: &[[S; 3]; 3], force: [S; 3]) -> [S; 3] {
+    w.map(|w| w[0] * force[0] + w[1] * force[1] + w[2] * force[2])
+}
+
 impl<S: Real> Process<S> {
     /// Goes on to an end.
     fn go(&mut self, end: End<S>) -> Result<(), ContactError> {
@@ -105,7 +115,7 @@ impl<S: Real> Process<S> {
             }
             let slides = self.slip()?;
             let force = match slides {
-                Some([x, y]) => [S::one(), -(self.friction * x), -(self.friction * y)],
+                Some(slip) => sliding_force(self.friction, slip),
                 None => self.hold(),
             };
             let rate = self.rate(force);
@@ -129,7 +139,7 @@ impl<S: Real> Process<S> {
 
     /// Rate of the velocities under a force for each unit of the normal impulse.
     fn rate(&self, force: [S; 3]) -> [S; 3] {
-        self.w.map(|w| w[0] * force[0] + w[1] * force[1] + w[2] * force[2])
+        rate(&self.w, force)
     }
 
     /// Direction of slip: of the motion, or of the motion that begins where the cone cannot hold it.
@@ -281,8 +291,8 @@ impl<S: Real> System for Keller<S> {
     fn rates_at(&mut self, _: S, y: &[S; 7], _: &[S; 7], yd: &mut [S; 7], none: &mut [S; 7]) {
         let [s, angle, v, ..] = *y;
         let [a, b] = self.direction(angle);
-        let force = [S::one(), -(self.friction * a), -(self.friction * b)];
-        let rate = self.w.map(|w| w[0] * force[0] + w[1] * force[1] + w[2] * force[2]);
+        let force = sliding_force(self.friction, [a, b]);
+        let rate = rate(&self.w, force);
         let (along, across) = (a * rate[1] + b * rate[2], a * rate[2] - b * rate[1]);
         *yd = [s * along, across, s * rate[0], s, s * force[1], s * force[2], s * v];
         *none = [S::zero(); 7];

@@ -22,6 +22,7 @@
 //! that of an impact with velocities that approach no slower. What friction holds does not move.
 
 mod approach;
+mod fall;
 #[cfg(feature = "hulls")]
 mod far;
 mod impulses;
@@ -63,23 +64,23 @@ pub struct TimeStepping<Y: Touching, B, I = ByRules> {
     pub post_step: B,
     /// Whether overlaps are taken away, where the way in which impulses are found allows it.
     pub lifts: bool,
-    pub(super) chart: Chart<WithContacts<Y>>,
-    pub(super) start: Point<WithContacts<Y>>,
-    pub(super) point: Point<WithContacts<Y>>,
-    pub(super) q: Y::Coordinates,
-    pub(super) p: Y::Momenta,
-    pub(super) qd: Y::Coordinates,
-    pub(super) pd: Y::Momenta,
+    chart: Chart<WithContacts<Y>>,
+    start: Point<WithContacts<Y>>,
+    point: Point<WithContacts<Y>>,
+    q: Y::Coordinates,
+    p: Y::Momenta,
+    qd: Y::Coordinates,
+    pd: Y::Momenta,
     /// Whether any contact has restitution; velocities of the rows at the start of the step then.
-    pub(super) bounces: bool,
-    pub(super) before: Y::Rows,
+    bounces: bool,
+    before: Y::Rows,
     /// Impulses of each contact in the last step, or the last part of one that was divided, and its length, s.
     last_impulses: Y::PerContact<[Y::Scalar; 3]>,
     impulse_time: Y::Scalar,
     /// Velocities with which coordinates go on.
-    pub(super) v: Y::Momenta,
+    v: Y::Momenta,
     /// Whether springs and dampers of the joints are taken implicitly in this step.
-    pub(super) implicit: bool,
+    implicit: bool,
     /// Whether a contact had an impulse in the last step, and whether it has one in this step.
     pressed: [Y::PerContact<bool>; 2],
     /// What the fastest gap that closes changes by in this step, m (rad for stops of rotations).

@@ -1,8 +1,8 @@
 //! The part of a time step between impulses: motion without contacts.
 
-use super::stepping::TimeStepping;
-use super::{HybridError, Touching, WithContacts};
+use super::TimeStepping;
 use crate::constrained::PostStep;
+use crate::contact::{HybridError, Touching, WithContacts};
 use crate::error::StepError;
 use crate::integrate::Chart;
 use crate::lists::copy;
