@@ -25,7 +25,7 @@ mkdir packages wheels
 for package in packages/*.deb; do dpkg -x "$package" root; done
 
 python3 -m pip download --quiet --only-binary=:all: --python-version "$version" --dest wheels \
-    --platform manylinux_2_28_aarch64 --platform manylinux_2_27_aarch64 --platform manylinux2014_aarch64 numpy pytest 'gymnasium>=1.0'
+    --platform manylinux_2_28_aarch64 --platform manylinux_2_27_aarch64 --platform manylinux2014_aarch64 numpy pytest 'gymnasium>=1.1'
 for file in wheels/*.whl "$wheel"; do python3 -m zipfile -e "$file" site; done
 
 # Tests start more processes of the same Python.

@@ -10,7 +10,7 @@ venv=target/python-venv
 $venv/bin/dask --version > /dev/null 2>&1 || {
     rm -rf $venv
     python3 -m venv $venv
-    $venv/bin/pip install --quiet 'maturin>=1.16,<2' 'numpy>=1.22' pytest 'gymnasium>=1.0' dask distributed
+    $venv/bin/pip install --quiet 'maturin>=1.16,<2' 'numpy>=1.22' pytest 'gymnasium>=1.1' dask distributed
 }
 cargo fmt --check -p multibody-python
 # The package's build finds maturin on the path.

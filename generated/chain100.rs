@@ -4379,7 +4379,7 @@ impl ::multibody::runtime::System for Chain100 {
     }
 
     #[inline]
-    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> ::core::option::Option<&str> {
         match part {
             ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
             ::multibody::runtime::system::Part::Constraint(k) => { let _ = k; None },

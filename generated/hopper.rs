@@ -2270,7 +2270,7 @@ impl ::multibody::runtime::System for Hopper {
     }
 
     #[inline]
-    fn part_name(&self, part: ::multibody::runtime::system::Part) -> Option<&str> {
+    fn part_name(&self, part: ::multibody::runtime::system::Part) -> ::core::option::Option<&str> {
         match part {
             ::multibody::runtime::system::Part::Velocity(k) => Self::VELOCITIES.get(k).copied(),
             ::multibody::runtime::system::Part::Constraint(k) => const { &["landing", "leg/lower", "leg/upper"] }.get(k).copied(),

@@ -125,6 +125,17 @@ pub fn chosen(plan: &Plan, asked: &[String], controlled: bool) -> Outcome<Column
             None => groups.push((group, vec![column])),
         }
     }
+    let mut known = Vec::new();
+    for (_, columns) in &mut groups {
+        // A column that is asked for twice is written once.
+        columns.retain(|(_, name)| {
+            !known.contains(name) && {
+                known.push(name.clone());
+                true
+            }
+        });
+    }
+    groups.retain(|(_, columns)| !columns.is_empty());
     let has = |group| groups.iter().any(|(g, _)| *g == group);
     if has(Group::Efforts) && !controlled {
         return Err(Failure::new(

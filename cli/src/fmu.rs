@@ -35,6 +35,13 @@ pub fn run(args: &GenerateArgs) -> Outcome {
         let what = format!("an FMU cannot keep the loops and couplings of `{}` closed", model.name);
         return Err(Failure::new(what, "model exchange has no projection of states: use generated Rust or C"));
     }
+    if !model.contacts.is_empty() {
+        let what = format!("an FMU would leave out the contacts and stops of `{}`", model.name);
+        return Err(Failure::new(
+            what,
+            "its unit has no events: take the contacts and limits out, or use generated Rust",
+        ));
+    }
     let unit = c::fmu(&model, &options(args, &model)?).map_err(failure)?;
     source::tell_notices(path, &unit.notices);
     let library = library(&unit)?;
@@ -105,9 +112,15 @@ struct Folder(PathBuf);
 
 impl Folder {
     fn new() -> std::io::Result<Folder> {
-        let folder = std::env::temp_dir().join(format!("mbd-fmu-{}", std::process::id()));
-        std::fs::create_dir(&folder)?;
-        Ok(Folder(folder))
+        // One of a run that was killed may be there, of a process with the same number.
+        let name = |k: u32| std::env::temp_dir().join(format!("mbd-fmu-{}-{k}", std::process::id()));
+        let mut k = 0;
+        loop {
+            match std::fs::create_dir(name(k)) {
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists && k < 1000 => k += 1,
+                made => return made.map(|()| Folder(name(k))),
+            }
+        }
     }
 }
 

@@ -110,6 +110,20 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
         }
         writable(file)?;
     }
+    if let Some(file) = &args.record_modes {
+        if settings.regimes.choice == RegimeChoice::TimeSteps {
+            return Err(Failure::new(
+                "--record-modes: time steps visit no modes",
+                "leave `--contacts stepping` out: modes are those between events",
+            ));
+        }
+        let others = [Some(&csv), Some(&svg), args.picture.as_ref()];
+        if others.into_iter().flatten().any(|other| same_file(file, other)) {
+            let what = format!("--record-modes: `{}` is to hold another result already", file.display());
+            return Err(Failure::new(what, "give it a name of its own"));
+        }
+        writable(file)?;
+    }
     verdict::start(path, &plan, &q)?;
     let of_contacts = [
         ("--record-modes", args.record_modes.is_some()),

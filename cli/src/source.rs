@@ -43,6 +43,18 @@ pub fn read(path: &Path) -> Outcome<String> {
     })
 }
 
+/// Reads JSON from standard input.
+pub fn standard_input() -> Outcome<String> {
+    let mut text = String::new();
+    let read = std::io::stdin().lock().take(LONGEST + 1).read_to_string(&mut text);
+    read.map_err(|e| Failure::new(format!("cannot read standard input: {e}"), "pipe JSON in, as UTF-8"))?;
+    if text.len() as u64 > LONGEST {
+        let what = format!("cannot read standard input: it is longer than {} MiB", LONGEST >> 20);
+        return Err(Failure::new(what, "pipe fewer states in"));
+    }
+    Ok(text)
+}
+
 /// What to do about a path that cannot be read.
 fn similar(path: &Path) -> String {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -28,7 +28,8 @@ class Event(NamedTuple):
     """A function of time and state whose zeros are events of a rollout: ``function(t, q, v)`` gives a number.
 
     ``direction`` is ``"both"``, ``"rising"`` (from negative values to zero) or ``"falling"``. A ``terminal`` event ends the row.
-    The function should be smooth; it is called from several threads, one at a time.
+    The function should be smooth; the threads of a rollout call it, so that calls for other rows
+    may come before one has ended: it must not share memory between calls, or the rollout needs ``threads=1``.
     """
 
     function: "Callable[[float, Any, Any], float]"

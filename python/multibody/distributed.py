@@ -25,7 +25,7 @@ from ._types import ModelError, SimulationError
 __all__ = ["rollout"]
 
 #: Errors that another attempt does not mend.
-FINAL = (ModelError, SimulationError, ValueError, TypeError)
+FINAL = (ModelError, SimulationError, ValueError, TypeError, pickle.PicklingError)
 #: Models that a worker keeps.
 KEPT = 8
 

@@ -70,6 +70,8 @@ class _Motion:
         self.touches, self.steps = touches, np.zeros(rows, dtype=np.int64)
         shapes = [(model.nq,), (model.nv,), self.axes.shape, (), (len(model.contact_names), 3)]
         self.state = State(*(np.zeros((rows, *shape)) for shape in shapes))
+        # Before the first reset it is a state, too: functions of the user are called on it for the shapes of what they give.
+        self.state.q[:], self.state.v[:] = model.start()
 
     def actions(self, control: str, limit: Any) -> Tuple[np.ndarray, ...]:
         """Velocities on which actions act, the efforts of actions of 1 (N m or N), least and greatest actions."""
@@ -83,7 +85,12 @@ class _Motion:
             if not len(axes):
                 raise ValueError("control='targets' needs joints with gains: multibody.load(..., gains=(kp, kd))")
             scale, ranges = self.model.kp[axes], self.model.joint_ranges[axes]
-            low, high = np.where(np.isfinite(ranges), ranges, [-np.pi, np.pi]).T
+            # Where one end of a range is missing, it is a turn away from the other if that is beyond π.
+            low, high = ranges.T
+            low, high = (
+                np.where(np.isfinite(low), low, np.minimum(-np.pi, np.where(np.isfinite(high), high, np.pi) - 2 * np.pi)),
+                np.where(np.isfinite(high), high, np.maximum(np.pi, np.where(np.isfinite(low), low, -np.pi) + 2 * np.pi)),
+            )
         else:
             raise ValueError(f"`control` is {control!r}: take 'efforts' or 'targets'")
         if isinstance(limit, tuple):
@@ -107,11 +114,15 @@ class _Motion:
         self.state.action[which], self.state.time[which], self.state.forces[which] = 0, 0, 0
 
     def observations(self) -> np.ndarray:
-        return np.asarray(self.observe(self.state), dtype=np.float64)
+        # A copy: what `observe` gives may be a view of the state.
+        return np.array(self.observe(self.state), dtype=np.float64)
 
     def step(self, actions: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Rewards, ends by the user's rule or by a failure, ends by time."""
-        actions = np.clip(np.asarray(actions, dtype=np.float64), self.low, self.high)
+        actions = np.asarray(actions, dtype=np.float64)
+        if actions.shape != (self.rows, len(self.axes)):
+            raise ValueError(f"actions have the shape {actions.shape}: {self.rows} states with {len(self.axes)} actions each are expected")
+        actions = np.clip(actions, self.low, self.high)
         u = np.zeros((self.rows, 1, self.model.nv))
         u[:, 0, self.axes] = self.scale * actions
         motion = self.model.rollout(

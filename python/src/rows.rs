@@ -54,6 +54,19 @@ impl Beat<'_> {
     }
 }
 
+/// A thread of [`on_threads`] that counts itself out where it ends, by a panic too: its caller would wait for it without end.
+struct Leaves<'a> {
+    left: &'a AtomicUsize,
+    caller: &'a std::thread::Thread,
+}
+
+impl Drop for Leaves<'_> {
+    fn drop(&mut self) {
+        self.left.fetch_sub(1, Ordering::Release);
+        self.caller.unpark();
+    }
+}
+
 /// Runs `work` on every item, each on one thread only; at most so many threads. Threads make their memory by `begin`.
 /// Called without the lock of the interpreter.
 ///
@@ -83,9 +96,8 @@ pub fn on_threads<T: Send, M>(
     std::thread::scope(|scope| {
         for _ in 1..threads {
             scope.spawn(|| {
+                let _leaves = Leaves { left: &left, caller: &caller };
                 all(&mut Beat { stop: &stop, error: &error, caller: None });
-                left.fetch_sub(1, Ordering::Release);
-                caller.unpark();
             });
         }
         let own = Caller { last: Instant::now(), steps: 0 };

@@ -124,6 +124,47 @@ def test_vectors_of_environments():
     single = multibody.gym.make(pendulum, **settings)
     single.reset(seed=1)
     assert single.step(np.ones(2))[0].shape == (4,)
+    for wrong in (np.zeros(4), np.zeros((4, 1)), 0.3):
+        with pytest.raises(ValueError, match="2 actions each are expected"):
+            envs.step(wrong)
+
+
+def test_observations_are_copies_and_begin_with_a_state():
+    pytest.importorskip("gymnasium")
+    robot = multibody.load(MODELS / "solo12.urdf", base="floating", search=False)
+
+    def observe(state):
+        assert (abs(np.square(state.q[:, 3:7]).sum(axis=1) - 1) < 1e-9).all()
+        return state.q
+
+    envs = multibody.gym.make_vec(robot, lambda state: state.q[:, 2], 3, observe=observe)
+    first, _ = envs.reset(seed=1)
+    kept = first.copy()
+    first[:] = 7.0
+    second, *_ = envs.step(np.zeros((3, 12)))
+    assert abs(second - kept).max() < 0.1
+    before = second.copy()
+    envs.reset(seed=2)
+    assert (second == before).all()
+
+
+def test_targets_of_joints_with_one_end():
+    pytest.importorskip("gymnasium")
+    text = """
+name = "lift"
+[[body]]
+name = "cabin"
+mass = 1
+[[joint]]
+name = "rail"
+type = "prismatic"
+child = "cabin"
+start = 5
+range = { lower = 4 }
+"""
+    lift = multibody.load(text=text, format="toml", gains=(100.0, 10.0))
+    space = multibody.gym.make(lift, lambda state: state.q[:, 0], control="targets").action_space
+    assert space.low == [4.0] and space.high == [4.0 + 2 * np.pi]
 
 
 @pytest.mark.filterwarnings("ignore")

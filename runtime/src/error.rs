@@ -42,7 +42,7 @@ pub enum StepError {
         /// The step, s.
         step: f64,
     },
-    /// A run was asked for whose end is not a number.
+    /// A run was asked for whose end is not a number, or whose state is at no finite time.
     InvalidEnd {
         /// Time, s.
         time: f64,
@@ -115,9 +115,9 @@ impl StepError {
 /// Whether a motion whose state is at time `t` (s) goes on to `t_end` (s).
 ///
 /// # Errors
-/// [`StepError::InvalidEnd`] if the end is not a number.
+/// [`StepError::InvalidEnd`] if the end is not a number, or the state's time not finite.
 pub(crate) fn is_before<S: Real>(t: S, t_end: S) -> Result<bool, StepError> {
-    match t_end.to_f64().is_nan() {
+    match t_end.to_f64().is_nan() || !t.is_finite() {
         true => Err(StepError::InvalidEnd { time: t.to_f64() }),
         false => Ok(t < t_end),
     }
@@ -152,7 +152,9 @@ impl StepError {
             StepError::InvalidStep { step, .. } => {
                 write!(f, "a step of {step} s was asked for: give one that is greater than zero and finite")
             }
-            StepError::InvalidEnd { .. } => write!(f, "the time at which the run should end is not a number"),
+            StepError::InvalidEnd { .. } => {
+                write!(f, "the time of the state is not finite, or that at which the run should end is not a number")
+            }
             StepError::InvalidTolerances { .. } => {
                 write!(f, "a tolerance is negative or not a number, or all are zero: give one greater than zero, such as 1e-9")
             }

@@ -56,7 +56,7 @@ impl Region {
 /// Reads and checks a box. All findings of the file are reported at once.
 pub fn read(path: &Path, plan: &Plan) -> Outcome<Region> {
     let (name, text) = match path.as_os_str() == "-" {
-        true => ("standard input".to_string(), std::io::read_to_string(std::io::stdin())?),
+        true => ("standard input".to_string(), source::standard_input()?),
         false => (path.display().to_string(), source::read(path)?),
     };
     let value: Value = serde_json::from_str(&text)

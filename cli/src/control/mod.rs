@@ -82,9 +82,19 @@ fn columns(letter: &str, names: impl Iterator<Item = (String, usize)>, bare: boo
     names.flat_map(both).flatten().collect()
 }
 
-/// Sets gains by their names.
+/// Sets gains: the one for all joints, then those by name, in whatever order they are given.
 fn set_gains(axes: &mut [Axis], names: &[String], which: usize, option: &str, gains: &[Gain]) -> Outcome {
-    for Gain { name, value } in gains {
+    for (k, gain) in gains.iter().enumerate() {
+        if gains[..k].iter().any(|other| other.name == gain.name) {
+            let whose = gain.name.as_deref().map_or("all joints".to_string(), quote);
+            return Err(Failure::new(
+                format!("--{option}: a second gain for {whose}"),
+                "give one number for all joints, and JOINT=NUMBER for those with another one",
+            ));
+        }
+    }
+    let (of_all, of_one): (Vec<&Gain>, Vec<&Gain>) = gains.iter().partition(|gain| gain.name.is_none());
+    for Gain { name, value } in of_all.into_iter().chain(of_one) {
         match name {
             None => axes.iter_mut().for_each(|axis| axis.gains[which] = *value),
             Some(name) => match axes.iter_mut().find(|axis| names[axis.v] == *name) {
@@ -107,7 +117,14 @@ impl Controller {
     /// The controller that the arguments describe, for a motion that starts at `q`; `None` where they describe none.
     pub fn new(plan: &Plan, args: &ControlArgs, q: &[f64], beside: &[String]) -> Outcome<Option<Rc<Controller>>> {
         if !args.any() {
-            return Ok(None);
+            let alone = [("--actuated", !args.actuated.is_empty()), ("--unlimited", args.unlimited)];
+            return match alone.into_iter().find(|(_, given)| *given) {
+                Some((option, _)) => Err(Failure::new(
+                    format!("{option}: nothing is controlled"),
+                    "leave it out, or give --efforts, --kp, --kd or --gravity-compensation",
+                )),
+                None => Ok(None),
+            };
         }
         let names = plan.velocity_names();
         let mut axes = axes(plan, q);

@@ -7,7 +7,7 @@ mod input;
 mod outer;
 
 use std::collections::BTreeSet;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::time::Instant;
 
 use clap::ValueEnum;
@@ -78,7 +78,7 @@ pub fn run(args: &EvalArgs, out: &mut dyn Write) -> Outcome {
     let plan = source::plan(&args.model, PlanOptions { snap: args.snap, ..PlanOptions::default() })?;
     let outer = Outer::new(&plan, args.layout);
     let (name, text) = match args.input.as_os_str() == "-" {
-        true => ("standard input".to_string(), standard_input()?),
+        true => ("standard input".to_string(), source::standard_input()?),
         false => (args.input.display().to_string(), source::read(&args.input)?),
     };
     let inputs = input::read(&text, &plan, &outer).map_err(|findings| {
@@ -100,13 +100,6 @@ pub fn run(args: &EvalArgs, out: &mut dyn Write) -> Outcome {
         other => other,
     })?;
     write_result(args.output.as_deref(), &text, out)
-}
-
-fn standard_input() -> Outcome<String> {
-    let mut text = String::new();
-    let read = std::io::stdin().lock().read_to_string(&mut text);
-    read.map_err(|e| Failure::new(format!("cannot read standard input: {e}"), "pipe JSON in, as UTF-8"))?;
-    Ok(text)
 }
 
 /// The model with the parameters of the file, computed by machine code in exact arithmetic if there are enough states,

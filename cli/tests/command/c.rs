@@ -112,6 +112,11 @@ fn fmpy_simulates_the_unit() {
     bad(run_in(&folder, &["generate", &model, "--lang", "fmu", "--scalar", "f32", "-o", "x.fmu"]), &["doubles"]);
     let loops = format!("{ROOT}/models/mechanisms/fourbar.toml");
     bad(run_in(&folder, &["generate", &loops, "--lang", "fmu", "-o", "x.fmu"]), &["cannot keep the loops"]);
+    let contacts = format!("{ROOT}/models/contacts/quadruped.toml");
+    bad(
+        run_in(&folder, &["generate", &contacts, "--lang", "fmu", "-o", "x.fmu"]),
+        &["leave out the contacts and stops"],
+    );
     if err(&first).contains("no shared library") {
         return eprintln!("skipped: no shared library was made");
     }

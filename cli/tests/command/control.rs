@@ -298,6 +298,9 @@ fn mistakes_in_tables_are_told_all_at_once() {
     );
     for (arguments, text) in [
         (&["--kp", "elbow=3"][..], "--kp: no joint that a controller acts on is named `elbow`"),
+        (&["--kp", "3,4"], "--kp: a second gain for all joints"),
+        (&["--kd", "hinge=3,1,hinge=4"], "--kd: a second gain for `hinge`"),
+        (&["--actuated", "hinge"], "--actuated: nothing is controlled"),
         (&["--actuated", "elbow", "--kp", "1"], "--actuated: no joint that a controller acts on is named `elbow`"),
         (&["--gravity-compensation", "--project"], "--project keeps the energy, which the control changes"),
         (&["--efforts", "none.csv"], "cannot read `none.csv`"),
@@ -305,6 +308,23 @@ fn mistakes_in_tables_are_told_all_at_once() {
         bad(run_in(&folder, &[&["simulate", &model], arguments].concat()), &[text]);
     }
     assert_eq!(files(&folder), ["bad.csv", "pendulum.toml"]);
+}
+
+/// The gain of a joint counts wherever it stands, and a column is written once.
+#[test]
+fn gains_have_no_order() {
+    let folder = folder("control_gains");
+    let model = write(&folder, "pendulum.toml", PENDULUM);
+    let table = |gains: &str| {
+        let arguments = ["simulate", &model, "--time", "0.2", "--kp", gains, "--kd", "1", "--columns", "q,v,q,q.hinge"];
+        good(run_in(&folder, &arguments));
+        read(&folder, "pendulum.csv")
+    };
+    let named = table("hinge=40");
+    assert_eq!(table("7,hinge=40"), named);
+    assert_eq!(table("hinge=40,7"), named);
+    assert!(table("7") != named);
+    assert_eq!(named.lines().next(), Some("t,q.hinge,v.hinge"));
 }
 
 /// A run that would take hours ends at once, with what it has.

@@ -94,6 +94,17 @@ static void values(const instance *unit, double *out)
     @PREFIX@_energy(&in, unit->state, unit->state + NQ, out + ENERGY);
 }
 
+/* A trial state may be one in which the mechanism has no rates: the importing tool is to take a shorter step. */
+static fmi2Status of_finite(const double *x, size_t n)
+{
+    for (size_t k = 0; k < n; k++) {
+        if (!(x[k] - x[k] == 0.0)) {
+            return fmi2Discard;
+        }
+    }
+    return fmi2OK;
+}
+
 FMI2_EXPORT fmi2String fmi2GetTypesPlatform(void)
 {
     return "default";
@@ -190,7 +201,7 @@ FMI2_EXPORT fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference of[
         }
         out[k] = all[of[k]];
     }
-    return fmi2OK;
+    return of_finite(out, n);
 }
 
 /* Rates, velocities and energies cannot be set. */
@@ -342,7 +353,7 @@ FMI2_EXPORT fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real out[], size_
         return fmi2Error;
     }
     rates(c, out);
-    return fmi2OK;
+    return of_finite(out, n);
 }
 
 FMI2_EXPORT fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real out[], size_t n)

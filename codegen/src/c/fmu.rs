@@ -61,7 +61,7 @@ pub fn fmu(model: &Model, options: &Options) -> Result<Fmu, GenerateError> {
         ("modelDescription.xml".to_string(), described(&identifier, &guid, &variables, plan)),
         (format!("sources/{identifier}.c"), source),
         (format!("sources/{identifier}.h"), header),
-        ("sources/fmi2.c".to_string(), wrapper(&prefix, &guid, plan, &fields)),
+        (format!("sources/{}", wrapper_file(&identifier)), wrapper(&prefix, &guid, plan, &fields)),
     ];
     Ok(Fmu { identifier, files, notices: plan.notices.clone() })
 }
@@ -133,12 +133,13 @@ fn described(identifier: &str, guid: &str, variables: &[Variable], plan: &Plan) 
   <ModelExchange modelIdentifier=\"{identifier}\">
     <SourceFiles>
       <File name=\"{identifier}.c\"/>
-      <File name=\"fmi2.c\"/>
+      <File name=\"{}\"/>
     </SourceFiles>
   </ModelExchange>
   <ModelVariables>
 ",
-        escaped(&plan.model.name)
+        escaped(&plan.model.name),
+        wrapper_file(identifier)
     );
     for (k, Variable { name, description, role, real }) in variables.iter().enumerate() {
         let (name, description) = (escaped(name), escaped(description));
@@ -175,6 +176,14 @@ fn escaped(text: &str) -> String {
         c => c.to_string(),
     };
     text.chars().map(character).collect()
+}
+
+/// The file of the functions of the standard, beside that of the model.
+fn wrapper_file(identifier: &str) -> &'static str {
+    match identifier {
+        "fmi2" => "fmi2_functions.c",
+        _ => "fmi2.c",
+    }
 }
 
 /// The functions of the standard.

@@ -107,7 +107,7 @@ impl Writer<'_> {
             },
             rates.map_or_else(String::new, |rates| self.rates_in_lanes(plan, rates)),
             method(
-                &format!("part_name(&self, part: {part}) -> Option<&str>"),
+                &format!("part_name(&self, part: {part}) -> ::core::option::Option<&str>"),
                 &format!(
                     "match part {{\n            {part}::Velocity(k) => Self::VELOCITIES.get(k).copied(),\n            \
                      {part}::Constraint(k) => {constraints},\n        }}"

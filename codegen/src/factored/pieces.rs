@@ -14,8 +14,9 @@ use crate::symbolic::{Expr, Graph, Op, ProgramResult};
 /// Largest number of sequences of limbs that touch.
 pub const MOST_TRUNKS: usize = 729;
 
-/// The code of an output for all sets of modes of its contacts; `None` where it cannot be taken apart, or where there are
-/// too many pieces. `full` is the plan with the rows of all contacts; none without contacts, or without their rows.
+/// The code of an output for all sets of modes of its contacts. `full` is the plan with the rows of all contacts
+/// ([`Plan::with_contacts`]). `None` where it cannot be taken apart, where there are too many pieces, and for a plan without
+/// contacts or without their rows.
 pub fn factored(full: &Plan, output: Output, options: &Options) -> Option<OutputProgram<FactoredProgram>> {
     if full.model.contacts.is_empty() || !full.contact_frames.is_empty() {
         return None;

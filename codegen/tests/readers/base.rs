@@ -12,6 +12,11 @@ const ROBOT: &str = "<?xml version=\"1.0\"?>\n<robot name='arm'>\n<link name='ba
 </inertial></link>\n<joint name='shoulder' type='continuous'><parent link='base'/><child link='upper'/>\
 <axis xyz='0 1 0'/></joint>\n</robot>\n";
 
+/// A ball whose contacts with a floor are those of all shapes.
+const RUBS: &str = "name = 'rubs'\n[contacts]\npairs = 'all'\nfriction = 0.8\n[[body]]\nname = 'ball'\nmass = 1\n\
+inertia = [1, 1, 1]\n[[joint]]\nname = 'free'\ntype = 'floating'\nchild = 'ball'\n[[shape]]\nname = 'floor'\n\
+type = 'plane'\n[[shape]]\nname = 'round'\ntype = 'sphere'\nradius = 0.1\nbody = 'ball'\n";
+
 /// Reads a text in the folder `robots`, where there are `arm.urdf` and `whole.toml`.
 fn read(text: &str) -> (Option<Model>, String, Vec<Severity>) {
     let files = |path: &Path| match path.to_string_lossy().replace('\\', "/").as_str() {
@@ -19,6 +24,7 @@ fn read(text: &str) -> (Option<Model>, String, Vec<Severity>) {
         "robots/broken.urdf" => {
             Ok(ROBOT.replace("'0.02' ixy", "'-0.02' ixy").replace("mass value='2'", "mass value='x'").into_bytes())
         }
+        "robots/rubs.toml" => Ok(RUBS.as_bytes().to_vec()),
         "robots/nested.toml" => Ok(b"[base]\nfile = 'arm.urdf'\n".to_vec()),
         _ => Err(Error::new(ErrorKind::NotFound, "no such file")),
     };
@@ -51,6 +57,20 @@ fn a_base_is_changed_and_added_to() {
     let upper = model.bodies.iter().find(|b| b.name == "upper").expect("the body");
     assert_eq!((upper.mass, upper.com[2]), (Value::Param(0), Value::Const(0.2)));
     assert_eq!((model.frames.len(), model.contacts.len()), (1, 2));
+}
+
+/// What holds for all contacts is replaced where it is stated anew, and stays otherwise.
+#[test]
+fn what_holds_for_all_contacts_is_changed_where_it_is_stated() {
+    let surface = |text: &str| {
+        let (model, findings, _) = read(&format!("[base]\nfile = 'rubs.toml'\n{text}"));
+        let model = model.expect(&findings);
+        model.contacts.iter().map(|contact| (contact.friction, contact.restitution)).collect::<Vec<_>>()
+    };
+    assert_eq!(surface(""), [(0.8, 0.0)]);
+    assert_eq!(surface("[contacts]\nrestitution = 0.1\n"), [(0.8, 0.1)]);
+    assert_eq!(surface("[contacts]\nfriction = 0.2\n"), [(0.2, 0.0)]);
+    assert_eq!(surface("[contacts]\npairs = 'listed'\n"), []);
 }
 
 #[test]

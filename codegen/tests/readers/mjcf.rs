@@ -315,6 +315,28 @@ fn equalities_close_where_the_file_places_the_bodies() {
     assert!(findings.contains("an equality that is not active is not used"), "{findings}");
 }
 
+/// The defaults of all equalities are those of `equality`.
+#[test]
+fn defaults_of_equalities_have_one_name() {
+    let text = format!(
+        "<default><equality active='false'/></default><worldbody><body name='a'><joint name='j'/>{BALL}</body></worldbody>\
+         <equality><connect body1='a' anchor='0 0 0'/><weld body1='a' active='true'/></equality>"
+    );
+    let (m, findings) = model(&text);
+    let welded = |kind: &ConstraintKind| matches!(kind, ConstraintKind::Loop { kind: LoopKind::Fixed, .. });
+    assert!(matches!(&m.constraints[..], [only] if welded(&only.kind)), "{findings}");
+}
+
+/// What a flag cannot be called is told.
+#[test]
+fn flags_have_known_names() {
+    let text = format!(
+        "<option><flag gravty='disable'/></option><worldbody><body name='a'><joint name='j'/>{BALL}</body></worldbody>"
+    );
+    let (_, findings) = model(&text);
+    assert!(findings.contains("unknown attribute `gravty`"), "{findings}");
+}
+
 #[test]
 fn flags_switch_off_what_acts() {
     let text = format!(

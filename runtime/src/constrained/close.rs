@@ -168,8 +168,12 @@ where
     if !size.is_finite() {
         return Err(ConstraintError::NotFinite { index: at });
     }
+    // Of velocities that no row binds, the residual says nothing.
+    if let Some(index) = new.as_ref().iter().position(|v| !v.is_finite()) {
+        return Err(ConstraintError::NotFinite { index });
+    }
     let residual = size.to_f64();
-    if residual > tolerance * worst(new.as_ref()).1.to_f64().max(1.0) {
+    if !(residual <= tolerance * worst(new.as_ref()).1.to_f64().max(1.0)) {
         let (constraint, rows) = (named(system, at), system.rows().len());
         return Err(ConstraintError::Incompatible { constraint, residual, rank, rows });
     }

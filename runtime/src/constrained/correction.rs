@@ -144,11 +144,16 @@ where
         self.noted.map(|noted| noted.rank)
     }
 
-    /// Notes the last correction at the end of a step; states inside the last step are not noted.
+    /// Notes the last correction at the end of a step; states inside the last step are not noted. Before its start, another motion
+    /// has begun.
     pub fn note(&mut self, system: &Y, t: Y::Scalar, pivots: &Y::Rows) {
         let zero = Y::Scalar::zero();
         let rank = self.rank;
         let last = match self.noted {
+            Some(last) if t <= last.t && last.step.is_some_and(|step| t < last.t - step) => {
+                self.roots.iter_mut().for_each(|roots| roots.as_mut().fill(zero));
+                None
+            }
             Some(last) if t <= last.t => return,
             last => last,
         };

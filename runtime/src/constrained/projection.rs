@@ -195,6 +195,13 @@ impl<S: Real> Ledger<S> {
     fn inside(&self, t: S) -> bool {
         self.last.is_some_and(|(last, _)| t <= last)
     }
+
+    /// Forgets all where time `t` is before the last step: another motion has begun.
+    fn begin(&mut self, t: S) {
+        if self.before.is_some_and(|(before, _)| t < before) {
+            *self = Ledger { last: None, before: None, most: S::zero() };
+        }
+    }
 }
 
 impl<Y> Projection<Y>
@@ -268,6 +275,7 @@ where
     ) -> Result<(), ConstraintError> {
         system.project_momenta(t, &self.q, &mut self.p, &mut room.v, &mut self.sigma);
         let closed = kinetic(self.p.as_ref(), room.v.as_ref());
+        self.ledger.begin(t);
         if free > self.ledger.most {
             self.ledger.most = free;
         }

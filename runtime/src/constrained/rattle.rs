@@ -9,6 +9,8 @@ use crate::Scalar;
 
 /// Largest number of iterations in a step.
 const ITERATIONS: u32 = 100;
+/// Size of the coordinates, rad or m, that changes are compared with at least.
+const LEAST_SIZE: f64 = 0.01;
 
 /// RATTLE (H. C. Andersen, 1983) for Hamiltonians that are not separable (E. Hairer, C. Lubich, G. Wanner, *Geometric
 /// Numerical Integration*, VII.1.4, (1.26)), order 2: positions and velocities satisfy the constraints at the end of
@@ -148,6 +150,8 @@ where
             middle.to_start(system, &mut step.delta.x);
         }
         let size = worst(self.start.0.as_ref()).1.to_f64().max(worst(step.delta.x.as_ref()).1.to_f64());
+        // Where all coordinates are about zero, rounding errors of the residuals are those of lengths.
+        let size = size.max(LEAST_SIZE);
         for (old, new) in self.other.as_mut().iter_mut().zip(step.delta.x.as_ref()) {
             *old = *old - *new;
         }

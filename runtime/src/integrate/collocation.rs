@@ -237,6 +237,8 @@ where
         }
         for part in self.weight.parts_mut() {
             let largest = part.iter().fold(Y::Scalar::zero(), |m, x| if *x > m { *x } else { m });
+            // At rest in the origin, nothing tells the size but the unit.
+            let largest = if largest > Y::Scalar::zero() { largest } else { Y::Scalar::one() };
             let least = Y::Scalar::constant(1e-3) * largest;
             for x in part {
                 *x = if *x > least { *x } else { least };

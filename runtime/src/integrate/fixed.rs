@@ -24,7 +24,7 @@ where
     Y: System,
     Y::Scalar: Real,
 {
-    /// This method with exactly `n` iterations a step, for real time.
+    /// This method with exactly `n` iterations a step, for real time; fixed-point methods make one at least.
     #[inline(always)]
     pub fn with_iterations(self, n: u32) -> Integrator<Y, FixedIterations<Collocation<Y, T, I, S>>> {
         self.map(|method| FixedIterations { method, n })
@@ -63,7 +63,7 @@ where
         h: Y::Scalar,
         scale: Option<&Point<Y>>,
     ) -> Result<f64, StepError> {
-        self.method.solve_by(step, system, t, h, self.n)?;
+        self.method.solve_by(step, system, t, h, self.n.max(u32::from(!I::DERIVATIVES)))?;
         Ok(self.method.conclude(step, system, t, h, scale))
     }
 

@@ -184,6 +184,15 @@ fn order_under_a_force_that_depends_on_time() {
     assert!((order - 5.0).abs() < 0.3, "{order}");
 }
 
+/// A step that is short against the time has a derivative with respect to time all the same.
+#[test]
+fn short_steps_at_late_times() {
+    let mut system = Oscillator { mass: 2.0, stiffness: 8.0, damping: 0.3, force: 3.0, rate: 5.0 };
+    let (mut q, mut p) = ([0.3], [0.1]);
+    Rodas5P::new(&system).step(&mut system, 1e6, 1e-9, &mut q, &mut p).unwrap();
+    assert!((q[0] - 0.3).abs() < 1e-9 && (p[0] - 0.1).abs() < 1e-7, "{q:?} {p:?}");
+}
+
 /// 1e8 N/m at a step of 1 ms: 2000 times longer than the fast motion's, which an L-stable method takes out at once and
 /// an A-stable one does not let grow.
 #[test]

@@ -81,7 +81,10 @@ where
 
     /// Central difference; its error is about 1e-10 of the rates' change in a step.
     fn differentiate_by_time(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar) {
-        let (after, before) = (t + h * self.shift, t - h * self.shift);
+        // Where the step is short against the time, both times have to differ from it all the same.
+        let (shift, least) = (h * self.shift, Y::Scalar::constant(64.0 * Y::Scalar::epsilon()) * t.abs());
+        let shift = if shift.abs() < least { least } else { shift };
+        let (after, before) = (t + shift, t - shift);
         self.stage.clear();
         step.field.rates(system, after, &self.stage, &mut self.by_time);
         step.field.rates(system, before, &self.stage, &mut step.end);

@@ -266,10 +266,11 @@ where
 
     fn fixed(&mut self, system: &mut Y, h: f64, t_end: Y::Scalar, rest: Y::Scalar) -> Result<(), StepError> {
         // A remainder that differs from the step by rounding only counts as one step.
-        let slack = 1e-9 * h + 2.0 * Y::Scalar::epsilon() * t_end.to_f64().abs();
+        let slack = (1e-9 * h + 2.0 * Y::Scalar::epsilon() * t_end.to_f64().abs()).min(0.5 * h);
         let over = rest.to_f64() - h;
-        let step = if over < -slack { rest } else { Y::Scalar::constant(h) };
         let last = over < slack;
+        let whole = !last || over.abs() <= slack.min(1e-3 * h);
+        let step = if whole { Y::Scalar::constant(h) } else { rest };
         self.method.attempt(system, self.t, step, None)?;
         self.check()?;
         self.wait(step, last.then_some(t_end));

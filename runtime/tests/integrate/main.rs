@@ -1,6 +1,7 @@
 //! Methods of integration on small systems that are written by hand.
 
 mod constrained;
+mod edges;
 mod events;
 mod multistep;
 mod schemes;

@@ -37,7 +37,7 @@ pub(super) fn all<'d>(
     let tags = ["connect", "weld", "joint", "tendon", "flex", "flexvert", "flexstrain"];
     for node in reader.children(section, &tags, &[]) {
         let tag = node.tag_name().name();
-        let element = classes.resolve(reader, node, &[tag], MAIN);
+        let element = classes.resolve(reader, node, &["equality"], MAIN);
         let shown = element.name().map_or(format!("a {tag}"), |name| quote(name.value));
         let whose = format!("equality {shown}: ");
         if flag(reader, &element, "active", &whose) == Some(false) {

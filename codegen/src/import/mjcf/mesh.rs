@@ -75,8 +75,16 @@ impl<'m, 'd> Meshes<'m, 'd> {
         for node in sections.iter().flat_map(|asset| asset.children()).filter(|node| node.has_tag_name("mesh")) {
             let element = classes.resolve(reader, node, &["mesh"], MAIN);
             reader.attributes(node, ATTRIBUTES);
-            let Some(name) = name_of(&element) else { continue };
-            all.insert(name, element);
+            match name_of(&element) {
+                Some(name) if all.contains_key(&name) => {
+                    let message = format!("mesh {} is defined twice", quote(&name));
+                    reader.findings.error(place(node), message, "rename one of them");
+                }
+                Some(name) => {
+                    all.insert(name, element);
+                }
+                None => {}
+            }
         }
         Meshes { all, read: RefCell::default(), hulls: RefCell::default(), told: RefCell::default(), assets }
     }
@@ -226,14 +234,21 @@ fn inline(reader: &mut Reader, element: &Element, whose: &str) -> Result<Vec<Tri
         return Err("a mesh without `file`, or without `face`, is not read".into());
     };
     let (vertices, faces) = (vertices(reader, &vertex, whose)?, list(reader, &face, "face", whose)?);
+    if faces.iter().any(|x| x.fract() != 0.0) {
+        return Err("its `face` has a number that is no whole one".into());
+    }
     let faces = faces.chunks_exact(3).map(|f| [0, 1, 2].map(|k| if f[k] >= 0.0 { f[k] as usize } else { usize::MAX }));
     corners(&vertices, faces)
 }
 
-/// The numbers of an attribute.
+/// The numbers of an attribute, in threes.
 fn list(reader: &mut Reader, text: &Spanned<&str>, key: &str, whose: &str) -> Result<Vec<f64>, String> {
     let all = parsed(reader, text, key, 3..=9 * MOST, whose);
-    all.map(|all| all.value).ok_or_else(|| format!("its `{key}` is not read"))
+    let all = all.map(|all| all.value).ok_or_else(|| format!("its `{key}` is not read"))?;
+    match all.len() % 3 {
+        0 => Ok(all),
+        _ => Err(format!("its `{key}` has {} numbers, which are not threes", all.len())),
+    }
 }
 
 /// Vertices that stand in the file. MuJoCo keeps them in single precision.

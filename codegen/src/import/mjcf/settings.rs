@@ -7,6 +7,36 @@ use crate::import::source::Spanned;
 use crate::import::xml::{place, Reader};
 use roxmltree::Node;
 
+/// What `flag` of `option` turns on and off.
+const FLAGS: &[&str] = &[
+    "constraint",
+    "equality",
+    "frictionloss",
+    "limit",
+    "contact",
+    "passive",
+    "spring",
+    "damper",
+    "gravity",
+    "clampctrl",
+    "warmstart",
+    "filterparent",
+    "actuation",
+    "refsafe",
+    "sensor",
+    "midphase",
+    "nativeccd",
+    "eulerdamp",
+    "autoreset",
+    "island",
+    "override",
+    "energy",
+    "fwdinv",
+    "invdiscrete",
+    "multiccd",
+    "sleep",
+];
+
 /// Where the inertia of a body comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FromGeoms {
@@ -172,6 +202,7 @@ impl Options {
             }
         }
         for flags in reader.children(node, &["flag"], &[]) {
+            reader.attributes(flags, FLAGS);
             for a in flags.attributes() {
                 self.off.retain(|off| off != a.name());
                 match a.value() {
@@ -188,7 +219,7 @@ impl Options {
             self.off.extend(["spring", "damper"].map(String::from));
         }
         if !self.on("constraint") {
-            self.off.push("equality".into());
+            self.off.extend(["equality", "limit"].map(String::from));
         }
         reader.tally.notice(place(node), "the integrator and the solver of `option` are not used");
     }

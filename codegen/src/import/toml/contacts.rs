@@ -60,9 +60,17 @@ pub(super) fn all(top: &Table, named: &Named, raw: &mut RawModel, findings: &mut
 pub(super) fn surfaces(top: &Table, raw: &mut RawModel, findings: &mut Findings) {
     if let Some(table) = top.table("contacts", findings) {
         table.reject_unknown(CONTACTS, "all contacts", findings);
-        let pairs = table.choice("pairs", &["listed", "all"], findings);
-        raw.all_pairs = pairs.filter(|choice| choice.value == 1).map(|choice| choice.span);
-        raw.surface = surface(&table, findings);
+        // What is not stated stays as the base has it.
+        if let Some(choice) = table.choice("pairs", &["listed", "all"], findings) {
+            raw.all_pairs = (choice.value == 1).then_some(choice.span);
+        }
+        let RawSurface { friction, restitution, law } = surface(&table, findings);
+        let before = std::mem::take(&mut raw.surface);
+        raw.surface = RawSurface {
+            friction: friction.or(before.friction),
+            restitution: restitution.or(before.restitution),
+            law: law.or(before.law),
+        };
     }
 }
 

@@ -180,7 +180,12 @@ fn bounds(joint: &mut RawJoint, node: Node) {
     let Some(spec) = joint.kind.as_ref().map(|k| k.value).filter(|spec| spec.nv() > 0) else { return };
     (joint.max_velocity, joint.max_effort) = (positive("velocity"), positive("effort"));
     let single = spec.nv() == 1 && !joint.unbounded && joint.mimic.is_none();
-    if let (true, Some(lower), Some(upper)) = (single, number("lower"), number("upper")) {
+    // Of the two, the one that is not stated is zero.
+    let ends = ["lower", "upper"].map(|key| match node.attribute(key) {
+        None => Some(Spanned::new(RawValue::Const(0.0), place(node))),
+        Some(_) => number(key),
+    });
+    if let (true, [Some(lower), Some(upper)]) = (single, ends) {
         let range = node.range();
         if matches!((&lower.value, &upper.value), (RawValue::Const(a), RawValue::Const(b)) if a < b) {
             let span = Span::new(range.start, range.end);

@@ -174,7 +174,8 @@ where
                         *size = *size + (h * *rate).abs();
                         most = if *size > most { *size } else { most };
                     }
-                    size.fill(most);
+                    // At rest in the origin, nothing tells the size but the unit.
+                    size.fill(if most > Y::Scalar::zero() { most } else { Y::Scalar::one() });
                 }
                 &self.size
             }
@@ -367,7 +368,8 @@ where
         let slow = f64::from(end.iterations.saturating_sub(MANY));
         self.cautious = if error > 1.0 { CAUTIOUS.1 } else { self.cautious.saturating_sub(1) };
         let most = match self.cautious {
-            _ if slow > 0.0 => 1.0 - 0.03 * slow,
+            // A fixed step may take so many iterations that nothing would be left.
+            _ if slow > 0.0 => (1.0 - 0.03 * slow).max(FACTORS[0]),
             0 => FACTORS[1],
             _ => CAUTIOUS.0,
         };
