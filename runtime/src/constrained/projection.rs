@@ -176,6 +176,11 @@ struct Ledger<S> {
 }
 
 impl<S: Real> Ledger<S> {
+    /// Before the first step.
+    fn empty() -> Self {
+        Ledger { last: None, before: None, most: S::zero() }
+    }
+
     /// Kinetic energy that the end of a step at time `t` (s) changes, J, where a correction changes it from `free` to
     /// `closed`: what is more than at the end of the step before.
     fn change(&self, t: S, [free, closed]: [S; 2]) -> S {
@@ -199,7 +204,7 @@ impl<S: Real> Ledger<S> {
     /// Forgets all where time `t` is before the last step: another motion has begun.
     fn begin(&mut self, t: S) {
         if self.before.is_some_and(|(before, _)| t < before) {
-            *self = Ledger { last: None, before: None, most: S::zero() };
+            *self = Ledger::empty();
         }
     }
 }
@@ -211,11 +216,10 @@ where
 {
     /// A projection for one system that iterates until the residuals are small.
     pub fn new(system: &Y, stabilisation: Stabilisation, effort: Effort) -> Self {
-        let zero = Y::Scalar::zero();
         let policy = ToTolerance {
             corrector: Corrector::new(system, stabilisation, effort),
             energy: effort.energy,
-            ledger: Ledger { last: None, before: None, most: zero },
+            ledger: Ledger::empty(),
             q: system.neutral(),
             p: system.zero_momenta(),
             sigma: system.zero_rows(),

@@ -10,7 +10,8 @@ use crate::Scalar;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Statistics {
-    /// Steps that were accepted. Single steps ([`Stepper::step`]) of one-step methods are not counted.
+    /// Steps that were accepted. One-step methods count single steps ([`Stepper::step`]) only with a post-step or an
+    /// [`EnergyProjection`](super::EnergyProjection).
     pub steps: u64,
     /// Steps that were rejected, and tried again with a smaller size.
     pub rejections: u64,

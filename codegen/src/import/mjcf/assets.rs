@@ -1,10 +1,11 @@
 //! Files that assets name: where they are, as the settings of `compiler` say.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::element::{flag, Element};
 use crate::import::words::quote;
-use crate::import::xml::Reader;
+use crate::import::xml::{place, Reader};
 use crate::import::ReadFile;
 use roxmltree::Node;
 
@@ -42,9 +43,28 @@ impl<'m> Assets<'m> {
 }
 
 /// The name of an asset: its own, or that of its file without folder and extension.
-pub(super) fn name_of(element: &Element) -> Option<String> {
+fn name_of(element: &Element) -> Option<String> {
     let file = || Path::new(element.attribute("file")?.value).file_stem();
     element.name().map(|name| name.value.to_string()).or_else(|| Some(file()?.to_string_lossy().into_owned()))
+}
+
+/// Adds an asset to all of its kind, which is called `what`, by its name.
+pub(super) fn add_named<'d>(
+    reader: &mut Reader,
+    all: &mut HashMap<String, Element<'d>>,
+    element: Element<'d>,
+    what: &str,
+) {
+    match name_of(&element) {
+        Some(name) if all.contains_key(&name) => {
+            let message = format!("{what} {} is defined twice", quote(&name));
+            reader.findings.error(place(element.node), message, "rename one of them");
+        }
+        Some(name) => {
+            all.insert(name, element);
+        }
+        None => {}
+    }
 }
 
 /// The extension of a file in small letters.

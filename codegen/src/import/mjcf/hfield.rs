@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-use super::assets::{extension, name_of, Assets};
+use super::assets::{add_named, extension, Assets};
 use super::element::{number, numbers, parsed, Element};
 use crate::diag::Severity;
 use crate::field::{FEWEST, MOST};
@@ -55,16 +55,7 @@ impl<'m, 'd> Fields<'m, 'd> {
         for node in sections.iter().flat_map(|asset| asset.children()).filter(|node| node.has_tag_name("hfield")) {
             let element = Element::plain(node);
             reader.attributes(node, ATTRIBUTES);
-            match name_of(&element) {
-                Some(name) if all.contains_key(&name) => {
-                    let message = format!("height field {} is defined twice", quote(&name));
-                    reader.findings.error(place(node), message, "rename one of them");
-                }
-                Some(name) => {
-                    all.insert(name, element);
-                }
-                None => {}
-            }
+            add_named(reader, &mut all, element, "height field");
         }
         let severity = if touched { Severity::Error } else { Severity::Warning };
         Fields { all, read: RefCell::default(), assets, severity }

@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-use super::assets::{extension, name_of, Assets};
+use super::assets::{add_named, extension, Assets};
 use super::classes::{Classes, MAIN};
 use super::element::{choice, numbers, parsed, vec3, Element};
 use super::pose::{normalised, rotate, Pose, Quat, NONE};
@@ -75,16 +75,7 @@ impl<'m, 'd> Meshes<'m, 'd> {
         for node in sections.iter().flat_map(|asset| asset.children()).filter(|node| node.has_tag_name("mesh")) {
             let element = classes.resolve(reader, node, &["mesh"], MAIN);
             reader.attributes(node, ATTRIBUTES);
-            match name_of(&element) {
-                Some(name) if all.contains_key(&name) => {
-                    let message = format!("mesh {} is defined twice", quote(&name));
-                    reader.findings.error(place(node), message, "rename one of them");
-                }
-                Some(name) => {
-                    all.insert(name, element);
-                }
-                None => {}
-            }
+            add_named(reader, &mut all, element, "mesh");
         }
         Meshes { all, read: RefCell::default(), hulls: RefCell::default(), told: RefCell::default(), assets }
     }
