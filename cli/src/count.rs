@@ -346,7 +346,7 @@ fn parts(plan: &Plan, options: &Options, group: Output) -> Outcome<Vec<Part>> {
     part("joint forces", here.abs_diff(other), options.efforts);
     part("external wrenches", here.saturating_sub(changed(&|m| m.wrenches.clear())?), true);
     part("dampers, springs and armature", here.saturating_sub(changed(&without_passive)?), true);
-    let exact = search::plan(&plan.model, PlanOptions { snap: 0.0, ..PlanOptions::default() });
+    let exact = search::plan(&plan.model, PlanOptions { snap: 0.0, ..options.searches() });
     part(RIGHT_ANGLES, total(&exact, options)?.saturating_sub(here), true);
     let single =
         search::plan(&plan.model, PlanOptions { elimination: EliminationStrategy::Single, ..options.searches() });

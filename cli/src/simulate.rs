@@ -173,7 +173,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
         }
     }
     writeln!(out, "work: {}", work(&record.statistics))?;
-    writeln!(out, "time: {}", spent(args.motion.time, &record.spent))?;
+    writeln!(out, "time: {}", spent(record.interrupted.unwrap_or(args.motion.time), &record.spent))?;
     writeln!(out, "table: {} ({} rows)\nplot: {}", csv.display(), record.t.len(), svg.display())?;
     if let Some(file) = &args.picture {
         writeln!(out, "picture: {}", file.display())?;
@@ -269,7 +269,7 @@ fn with_contacts(
     writeln!(
         out,
         "time: {seconds:.3} s, {}; {}",
-        pace(args.motion.time / seconds),
+        pace(record.interrupted.unwrap_or(args.motion.time) / seconds),
         contacts::ways(&touched, settings.regimes.choice)
     )?;
     let rows = record.t.len();

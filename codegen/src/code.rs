@@ -48,9 +48,12 @@ impl Code {
     }
 
     /// Whether an operation reads a table.
-    #[cfg(all(feature = "jit", feature = "height_fields"))]
     pub fn looks_up(&self) -> bool {
-        self.operations().any(|op| matches!(op, Op::LookUp(_)))
+        match cfg!(feature = "height_fields") {
+            #[cfg(feature = "height_fields")]
+            true => self.operations().any(|op| matches!(op, Op::LookUp(_))),
+            _ => false,
+        }
     }
 
     /// Bits of the constants that operations have.
@@ -199,6 +202,14 @@ impl Programs {
     /// The programs of all functions.
     pub fn functions(&self) -> Vec<&OutputProgram<Code>> {
         self.outputs.iter().chain(&self.coordinate_rates).collect()
+    }
+
+    /// Rejects programs that read tables, as those of contacts with height fields do: Rust and machine code alone have them.
+    pub(crate) fn without_tables(self) -> Result<Programs, GenerateError> {
+        match self.functions().iter().any(|function| function.program.looks_up()) {
+            true => Err(GenerateError::TablesNeedRust),
+            false => Ok(self),
+        }
     }
 
     /// Operations of each output.

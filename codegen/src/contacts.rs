@@ -15,7 +15,8 @@ use crate::plan::{Plan, PlanConstraint};
 impl Plan {
     /// The contacts, by their rows in [`Plan::with_contacts`], of this plan or of the one it was called on.
     pub fn contacts<S: Real>(&self) -> Vec<Contact<S>> {
-        let full = if self.has_contacts() { self.clone() } else { self.with_contacts() };
+        let all = self.with_all_rows();
+        let full = if all.has_contacts() { all.clone() } else { all.with_contacts() };
         let first = full.constraints.len() - self.model.contacts.len();
         let contact = |(contact, constraint): (&crate::model::Contact, &PlanConstraint)| Contact {
             row: constraint.first,

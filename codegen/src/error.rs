@@ -65,6 +65,8 @@ pub enum GenerateError {
     },
     /// Code for modes of contacts is Rust only.
     ModesNeedRust,
+    /// Code for contacts with height fields is Rust only.
+    TablesNeedRust,
     /// A number in the code is infinite: a freedom has no inertia, which the checks of the model cannot see where
     /// parameters are involved.
     InfiniteNumber {
@@ -116,6 +118,7 @@ impl fmt::Display for GenerateError {
             GenerateError::ModesNotFactored { model } => {
                 write!(f, "the contacts of `{model}` have too many modes for pieces, which serve limbs that have a few contacts each: list those that a motion visits (`mbd modes --record`)")
             }
+            GenerateError::TablesNeedRust => write!(f, "code for contacts with height fields exists in Rust only"),
             GenerateError::ModesNeedRust => {
                 write!(f, "code for modes of contacts exists in Rust only")
             }

@@ -30,7 +30,8 @@ choice! {
         /// Operations that are rewritten, regrouped, fused and scheduled for speed: other rounding, but no larger
         /// errors.
         Fast = "fast",
-        /// The operations of the sweeps unchanged, which give the bits of the interpreter.
+        /// The operations of the sweeps unchanged, which give the bits of the interpreter in double precision. (In
+        /// single precision, code has constants that were computed in double precision.)
         Exact = "exact",
     }
 }
@@ -137,7 +138,7 @@ impl PlanOptions {
 pub struct Options {
     /// Name of the generated type.
     pub type_name: String,
-    /// Outputs that it computes.
+    /// Outputs that it computes, each once.
     pub outputs: Vec<Output>,
     /// Number type.
     pub precision: Precision,
@@ -162,12 +163,18 @@ pub struct Options {
 impl Options {
     /// The options for a model with or without constraints: where the outputs are [`Output::DEFAULT`], or all of a
     /// model without constraints, a model with constraints also gets the outputs that only such models have, and not
-    /// those that they lack.
+    /// those that they lack. Outputs that are listed more than once are there once.
     pub fn of_model(&self, constrained: bool) -> Options {
         let mut options = self.clone();
+        options.outputs.clear();
+        for output in &self.outputs {
+            if !options.outputs.contains(output) {
+                options.outputs.push(*output);
+            }
+        }
         // Contacts are constraints.
         let constrained = constrained || self.modes.is_some();
-        let mut asked: Vec<Output> = self.outputs.clone();
+        let mut asked: Vec<Output> = options.outputs.clone();
         asked.sort_unstable();
         let unchosen = asked == Output::DEFAULT || Output::available(false).eq(asked);
         if constrained && unchosen {

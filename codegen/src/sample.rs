@@ -20,7 +20,8 @@ pub struct State {
 }
 
 impl State {
-    /// The state of a seed: angles up to 3 rad, displacements up to 0.6 m, velocities up to 1.5; no momenta yet.
+    /// The state of a seed: angles up to 3 rad, displacements of prismatic joints up to 0.6 m and of joints with several
+    /// coordinates up to 3 m, velocities up to 1.5; no momenta yet.
     pub fn new(plan: &Plan, seed: u64) -> State {
         let d = plan.dims;
         let (mut q, mut drive_q) = (random(seed, 0, d.nq, 3.0), random(seed, 1, d.drive_q, 3.0));

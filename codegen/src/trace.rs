@@ -19,7 +19,7 @@ use crate::symbolic::{passes, Entry, Expr, Graph, Name, Program, Rewrite};
 pub use inputs::sizes;
 pub(crate) use inputs::SymbolicInputs;
 
-/// Frames of the options, as indices into the plan's.
+/// Frames of the options, as indices into the plan's, each once.
 ///
 /// # Errors
 /// A name that is none of a frame or body.
@@ -31,7 +31,14 @@ pub fn chosen_frames(plan: &Plan, options: &Options) -> Result<Vec<usize>, Gener
         let found = plan.frames.iter().position(|f| f.name == *name);
         found.ok_or_else(|| GenerateError::UnknownFrame { name: name.clone() })
     };
-    options.frames.iter().map(find).collect()
+    let mut chosen = Vec::new();
+    for name in &options.frames {
+        let frame = find(name)?;
+        if !chosen.contains(&frame) {
+            chosen.push(frame);
+        }
+    }
+    Ok(chosen)
 }
 
 /// Rejects an output that the model does not have.
@@ -159,7 +166,11 @@ impl<'g> Run<'_, 'g> {
         let sweeps = Sweeps { tree, trace };
         // The tree for accelerations, where another elimination is better for them.
         let other = Sweeps { tree: tree.for_accelerations(), trace };
-        let w = &mut Workspace::new(tree);
+        let used = match output {
+            Output::Accelerations | Output::Reactions | Output::Multipliers => &other,
+            _ => &sweeps,
+        };
+        let w = &mut Workspace::new(used.tree);
         let v = &mut vec![Expr::zero(); tree.dims.nv];
         match (output, results) {
             (Output::Rates, [qd, pd]) => sweeps.rates(q, second, u, w, v, qd, pd),
@@ -204,14 +215,10 @@ impl<'g> Run<'_, 'g> {
             (Output::ProjectMomenta, [v, freed, sigma]) => sweeps.project_momenta(q, second, u, w, v, freed, sigma),
             (Output::PositionCorrection, [phi, dq, pivots]) => sweeps.position_correction(q, u, w, phi, dq, pivots),
             (Output::Gaps, [gaps, velocities, entries]) => sweeps.gaps(q, second, u, w, [gaps, velocities, entries]),
-            (Output::Multipliers, [lambda]) => {
-                *w = Workspace::new(other.tree);
-                other.multipliers(q, second, u, w, v, lambda);
-                return other.early_rows_act(&w.factor);
-            }
+            (Output::Multipliers, [lambda]) => other.multipliers(q, second, u, w, v, lambda),
             _ => unreachable!("results are those of the table"),
         }
-        sweeps.early_rows_act(&w.factor)
+        used.early_rows_act(&w.factor)
     }
 
     /// The chosen frames.

@@ -32,7 +32,9 @@ macro_rules! inputs {
 use inputs;
 
 /// Runs the sweeps on numbers. It allocates when it is made and not afterwards, except for the memory of derivatives,
-/// which is allocated when it is first needed.
+/// which is allocated when it is first needed, and where rows are put into another order ([`Constrained::reorder_rows`]).
+///
+/// [`Constrained::reorder_rows`]: crate::system::Constrained::reorder_rows
 ///
 /// All calls take slices in the order of the state; a slice of another length than [`Tree::dims`] says is a programming
 /// error and panics.
@@ -43,6 +45,8 @@ pub struct Interpreter<S> {
     /// As described: reactions.
     physical: Tree<S>,
     work: Workspace<S>,
+    /// Memory for the tree for accelerations, where it is another one: its rows are coupled in another way.
+    other_work: Option<Box<Workspace<S>>>,
     /// Whether the regrouped tree is plain.
     plain: bool,
     /// Joint forces, `nv` numbers, N m or N.
@@ -109,6 +113,7 @@ impl<S: Scalar> Interpreter<S> {
             gravity,
             names: [Vec::new(), Vec::new()],
             work: Workspace::new(&tree),
+            other_work: Self::other_work(&tree),
             plain: tree.is_plain(),
             v: vec![o; dims.nv],
             rows: tree.rows(),
@@ -119,6 +124,11 @@ impl<S: Scalar> Interpreter<S> {
             neutral,
             derivatives: None,
         }
+    }
+
+    /// Memory for the tree for accelerations, where it is another one.
+    fn other_work(tree: &Tree<S>) -> Option<Box<Workspace<S>>> {
+        tree.accelerations.as_deref().map(|other| Box::new(Workspace::new(other)))
     }
 
     /// The interpreter in which only some rows of the constraints act, with zero inputs and the gravity of this one. Its
@@ -210,7 +220,8 @@ impl<S: Scalar> Interpreter<S> {
     /// `(q, v) → v̇`.
     pub fn accelerations(&mut self, q: &[S], v: &[S], a: &mut [S]) {
         let sweeps = Sweeps { tree: self.tree.for_accelerations(), trace: &() };
-        sweeps.accelerations(q, v, &inputs!(self), &mut self.work, a);
+        let work = self.other_work.as_deref_mut().unwrap_or(&mut self.work);
+        sweeps.accelerations(q, v, &inputs!(self), work, a);
     }
 
     /// Residuals of the constraints and entries of `Φ`, `q → (φ, Φ)`:
@@ -225,7 +236,8 @@ impl<S: Scalar> Interpreter<S> {
     /// [`Constrained::multipliers`](crate::system::Constrained::multipliers), also for scalars that cannot be compared.
     pub fn constraint_multipliers(&mut self, q: &[S], v: &[S], lambda: &mut [S]) {
         let sweeps = Sweeps { tree: self.tree.for_accelerations(), trace: &() };
-        sweeps.multipliers(q, v, &inputs!(self), &mut self.work, &mut self.v, lambda);
+        let work = self.other_work.as_deref_mut().unwrap_or(&mut self.work);
+        sweeps.multipliers(q, v, &inputs!(self), work, &mut self.v, lambda);
     }
 
     /// `(q, v) → (v̇, reaction wrenches)`: `[force; moment]` transmitted by every joint to its child, in the child's
@@ -286,6 +298,19 @@ impl<S: Scalar> Interpreter<S> {
     pub fn mass_matrix(&mut self, q: &[S], m: &mut [S]) {
         let sweeps = Sweeps { tree: &self.tree, trace: &() };
         sweeps.mass_matrix(q, &inputs!(self), &mut self.work, m);
+    }
+
+    /// `q →` diagonal of `M`, `nv` numbers. It allocates.
+    pub(crate) fn mass_diagonal(&mut self, q: &[S], m: &mut [S]) {
+        let mut joints = vec![0; self.tree.dims.nv];
+        for node in &self.tree.nodes {
+            if let Source::State { v, .. } = node.source {
+                joints[v..v + node.kind.nv()].iter_mut().for_each(|count| *count += 1);
+            }
+        }
+        let several: Vec<bool> = joints.iter().map(|count| *count > 1).collect();
+        let sweeps = Sweeps { tree: &self.tree, trace: &() };
+        sweeps.mass_diagonal(q, &inputs!(self), &mut self.work, &several, m);
     }
 
     /// Momenta, their rates and derivatives of both at given velocities; `d` and `out` are made of

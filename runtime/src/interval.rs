@@ -111,8 +111,11 @@ impl Interval {
         }
     }
 
-    /// Both halves.
+    /// Both halves; the whole twice where it is not bounded.
     pub fn halves(self) -> [Interval; 2] {
+        if !self.is_bounded() {
+            return [self; 2];
+        }
         let middle = self.middle();
         [Interval { high: middle, ..self }, Interval { low: middle, ..self }]
     }

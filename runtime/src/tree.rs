@@ -363,7 +363,7 @@ pub enum Closure<S> {
 /// A constraint between two frames on bodies.
 #[derive(Clone, Debug)]
 pub struct Cut<S> {
-    /// The frames or joints that it connects.
+    /// What it holds together: points, axes, frames, or surfaces that touch.
     pub closure: Closure<S>,
     /// First frame, `A`.
     pub a: TreeFrame<S>,

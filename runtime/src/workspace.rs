@@ -143,18 +143,19 @@ pub struct Factor<S> {
     pub m: Vec<ArticulatedInertia<S>>,
     /// Pivots of the nodes' own freedoms, in node order.
     pub pivots: Vec<Pivot<S>>,
-    /// Pivots of shared coordinates.
+    /// Pivots of the unknowns of the tree: coordinates that several joints share, freedoms that are solved at another node than
+    /// their joint's, and rows of constraints.
     pub unknown_pivots: Vec<Pivot<S>>,
-    /// `F'_g` of shared coordinate `g` at node `i`, at `g · nodes + i`.
+    /// `F'_g` of unknown `g` at node `i`, at `g · nodes + i`.
     pub columns: Vec<Force<S>>,
-    /// Screw of the freedom of shared coordinate `g` at node `i`, where [`crate::tree::Elimination::screws`] asks for
+    /// Screw of the freedom of unknown `g` at node `i`, where [`crate::tree::Elimination::screws`] asks for
     /// it, at `g · nodes + i`.
     pub screws: Vec<Motion<S>>,
-    /// Inertia between shared coordinates, while they are open.
+    /// Inertia between unknowns, while they are open.
     pub gram: Vec<S>,
-    /// `E · F_h` of every freedom with every open coordinate, at `freedom · shared + h`.
+    /// `E · F_h` of every freedom with every open unknown, at `freedom · unknowns + h`.
     pub cross: Vec<S>,
-    /// The same for shared coordinates with one another.
+    /// The same for unknowns with one another.
     pub unknown_cross: Vec<S>,
     /// Diagonal of `Φ M⁻¹Φᵀ` of every multiplier, before other multipliers are taken out of it; with the nodes of one
     /// constraint's cycle as far as they are done.
@@ -228,11 +229,11 @@ pub struct Solution<S> {
     pub d: Vec<Force<S>>,
     /// `(p − d) / Mj` of every freedom; the prescribed rate where there is one.
     pub e: Vec<S>,
-    /// The same for shared coordinates.
+    /// The same for unknowns.
     pub unknown_e: Vec<S>,
     /// Rate of every freedom of every node.
     pub rate: Vec<S>,
-    /// Rate of every shared coordinate.
+    /// Rate of every unknown.
     pub unknown_rate: Vec<S>,
     /// `Ω̂_i`: motion of the node frame before its own freedoms.
     pub hat: Vec<Motion<S>>,
@@ -345,8 +346,8 @@ impl<S: Scalar> Workspace<S> {
                 later: later(tree),
             },
             constraints: Constraints {
-                through: (0..n).map(|i| through(tree, i)).collect(),
-                grounded: (0..n).map(|i| grounded(tree, i)).collect(),
+                through: through(tree),
+                grounded: grounded(tree),
                 to_ground: vec![Force::zero(); n],
                 end_wrenches: vec![[Force::zero(); 2]; tree.constraints.len()],
                 reach: vec![[([[o; 3]; 3], [o; 3]); 2]; tree.constraints.len()],
@@ -387,24 +388,34 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-/// The constraints that act through a node, with their parts.
-fn through<S>(tree: &Tree<S>, i: usize) -> Vec<(usize, usize)> {
-    let parts = tree.constraints.iter().enumerate().flat_map(|(index, constraint)| {
-        let parts: Vec<bool> = match &constraint.bond {
-            Bond::Cut(cut) => [&cut.path_a, &cut.path_b].map(|path| path.contains(&i)).into(),
-            Bond::Coupling { terms, .. } => terms.iter().map(|(node, _)| *node == i).collect(),
-        };
-        parts.into_iter().enumerate().filter(|(_, here)| *here).map(move |(part, _)| (index, part))
-    });
-    parts.collect()
+/// The constraints that act through each node, with their parts.
+fn through<S>(tree: &Tree<S>) -> Vec<Vec<(usize, usize)>> {
+    let mut through = vec![Vec::new(); tree.nodes.len()];
+    for (index, constraint) in tree.constraints.iter().enumerate() {
+        match &constraint.bond {
+            Bond::Cut(cut) => {
+                for (part, path) in [&cut.path_a, &cut.path_b].into_iter().enumerate() {
+                    path.iter().for_each(|&i| through[i].push((index, part)));
+                }
+            }
+            Bond::Coupling { terms, .. } => {
+                terms.iter().enumerate().for_each(|(part, (node, _))| through[*node].push((index, part)));
+            }
+        }
+    }
+    through
 }
 
-/// Whether loops through the ground act through a node.
-fn grounded<S>(tree: &Tree<S>, i: usize) -> bool {
-    tree.constraints.iter().any(|constraint| match &constraint.bond {
-        Bond::Cut(cut) => cut.grounded && [&cut.path_a, &cut.path_b].iter().any(|path| path.contains(&i)),
-        Bond::Coupling { .. } => false,
-    })
+/// Whether loops through the ground act through each node.
+fn grounded<S>(tree: &Tree<S>) -> Vec<bool> {
+    let mut grounded = vec![false; tree.nodes.len()];
+    for constraint in &tree.constraints {
+        if let Bond::Cut(cut) = &constraint.bond {
+            let path = cut.path_a.iter().chain(&cut.path_b).filter(|_| cut.grounded);
+            path.for_each(|&i| grounded[i] = true);
+        }
+    }
+    grounded
 }
 
 /// For every unknown, whether it is an early row.

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use super::function::{entries, length, Function};
 use super::names::{comment, literal, number, quoted, Prefix};
 use crate::emit::constants::{constants, Constant, Content};
-use crate::emit::fields::{neutral, Field};
+use crate::emit::fields::{initial, neutral, Field};
 use crate::emit::Input;
 use crate::options::{Arithmetic, Precision};
 use crate::output::{flat_entry, Dim, FIELDS};
@@ -134,7 +134,7 @@ fn inputs(out: &mut String, prefix: &Prefix, input: &Input, fields: &[Field]) {
     if fields.is_empty() {
         let _ = writeln!(out, "    /* Nothing: C has no structs without members. */\n    int none;");
     }
-    let _ = writeln!(out, "}} {lower}_inputs;\n\n/* All inputs zero, parameters at their defaults. */");
+    let _ = writeln!(out, "}} {lower}_inputs;\n\n/* {} */", initial(fields));
     let _ = writeln!(out, "void {lower}_inputs_init({lower}_inputs *in);");
 }
 

@@ -1,7 +1,7 @@
 //! C99 of the same programs as generated Rust: a header and a source without libm, allocation and globals.
 //!
 //! A function takes the struct of inputs, then its arguments, then its results: flat arrays, the last index fastest. In
-//! exact arithmetic and with `-ffp-contract=off` it gives the bits of the interpreter, sines and cosines included, which
+//! exact arithmetic, double precision and with `-ffp-contract=off` it gives the bits of the interpreter, sines and cosines included, which
 //! are part of the source.
 //!
 //! ```
@@ -71,7 +71,7 @@ pub fn generate_from(plan: &Plan, options: &Options, name: &str) -> Result<Gener
     if options.modes.is_some() {
         return Err(GenerateError::ModesNeedRust);
     }
-    let programs = Programs::new(plan, options)?;
+    let programs = Programs::new(plan, options)?.without_tables()?;
     let (header, source) = files(&Input { plan, options, programs: &programs }, name);
     Ok(GeneratedC { header, source, counts: programs.counts(options), notices: plan.notices.clone() })
 }

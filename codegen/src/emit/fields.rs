@@ -35,6 +35,14 @@ impl Field {
     }
 }
 
+/// What the fields are at first, for comments.
+pub fn initial(fields: &[Field]) -> &'static str {
+    match fields.iter().any(|field| ["drive_q", "gravity", "acts"].contains(&field.name)) {
+        false => "All inputs zero, parameters at their defaults.",
+        true => "Parameters, gravity and which rows act at their defaults, prescribed joints in their neutral positions, all else zero.",
+    }
+}
+
 /// The fields of a type.
 pub fn fields(plan: &Plan, sizes: &Sizes) -> Vec<Field> {
     let present = FIELDS.into_iter().filter(|field| field.array.len(sizes) > 0);
@@ -87,10 +95,11 @@ pub fn constructor(out: &mut String, options: &Options, fields: &[Field], contac
     let _ = writeln!(
         out,
         "
-    /// All inputs zero, parameters at their defaults.
+    /// {}
     pub const fn new() -> Self {{
         {} {{ {} }}
     }}",
+        initial(fields),
         options.type_name,
         values.join(", ")
     );

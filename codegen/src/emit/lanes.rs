@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::fields::{default, type_definition, Field};
+use super::fields::{default, initial, type_definition, Field};
 use super::head::tuple;
 use super::signature::{Port, Signature};
 use crate::options::{Options, Precision};
@@ -35,10 +35,12 @@ pub fn kernels(out: &mut String, options: &Options, kernels: &[Kernel]) {
     let (name, rt, t) = (&options.type_name, &options.runtime, options.precision.name());
     for kernel in kernels {
         let numbered = || kernel.ports.iter().enumerate();
+        // The letter of the generic parameters; a type of the name `P0` needs another one.
+        let letter = if name.starts_with('P') && name[1..].parse::<usize>().is_ok() { 'G' } else { 'P' };
         let generics: String =
-            numbered().map(|(k, p)| format!("P{k}: {rt}::kernel::{}<{t}> + ?Sized, ", p.access())).collect();
+            numbered().map(|(k, p)| format!("{letter}{k}: {rt}::kernel::{}<{t}> + ?Sized, ", p.access())).collect();
         let types: Vec<String> =
-            numbered().map(|(k, p)| p.reference(&format!("P{k}")).replacen('&', "&'a ", 1)).collect();
+            numbered().map(|(k, p)| p.reference(&format!("{letter}{k}")).replacen('&', "&'a ", 1)).collect();
         let names: Vec<String> = kernel.ports.iter().map(|p| p.name.to_string()).collect();
         let (types, pattern) = (tuple(&types), tuple(&names));
         let _ = writeln!(
@@ -75,10 +77,11 @@ pub fn lanes_type(out: &mut String, options: &Options, fields: &[Field], kernels
         "
 {ALLOWED}
 impl<const LANES: usize> {name}Lanes<LANES> {{
-    /// All inputs zero, parameters at their defaults.
+    /// {}
     pub fn new() -> Self {{
         {name}::new().lanes()
-    }}"
+    }}",
+        initial(fields)
     );
     for kernel in kernels {
         lanes_function(out, options, kernel, &lane);

@@ -73,7 +73,9 @@ pub fn source(input: &Input) -> String {
     constants::write(&mut out, &constants::constants(input), options);
     if let Some(contacts) = &contacts {
         contacts.constants(&mut out, plan);
-        #[cfg(feature = "height_fields")]
+    }
+    #[cfg(feature = "height_fields")]
+    if contacts.is_some() || plan.has_contacts() {
         constants::tables(&mut out, plan);
     }
     fields::constructor(&mut out, options, &fields, contacts.as_ref());

@@ -118,7 +118,7 @@ impl<'a> Straight<'a> {
         };
         let steps = self.program.steps.iter().filter(|(id, _, _)| set.contains(id));
         let statements: Vec<Statement> = steps.filter_map(|step| self.statement(step, &given, &mut late)).collect();
-        let chunk = self.head.options.chunk;
+        let chunk = self.head.options.chunk.max(1);
         if statements.len() <= chunk {
             return self.write_statements(out, &statements, lanes, "            ");
         }

@@ -79,6 +79,8 @@ pub struct Tracing<'g, 'a> {
     /// Whether the rows of each contact come to the trunk.
     pub(super) reaching: Vec<bool>,
     pub(super) full: &'a Plan,
+    /// The plan whose elimination the output uses.
+    plan: &'a Plan,
     pub(super) output: Output,
     pub(super) options: &'a Options,
     pub(super) contacts: Vec<Contact<f64>>,
@@ -97,7 +99,6 @@ impl<'g, 'a> Tracing<'g, 'a> {
         // Which rows act is an input of the function, by which it chooses its pieces; no operation reads it.
         let given = Rc::new(SymbolicInputs::new(graph, &full.masked(), output.spec(), options));
         let first = given.arrays.iter().map(InputArray::len).sum();
-        // The tree whose elimination the output uses.
         let plan = match output {
             Output::Multipliers => full.accelerations.as_deref().unwrap_or(full),
             _ => full,
@@ -126,6 +127,7 @@ impl<'g, 'a> Tracing<'g, 'a> {
             found: BTreeSet::new(),
             reaching: of_contacts(plan).map(|index| reaches(plan, index, &trunk)).collect(),
             full,
+            plan,
             output,
             options,
             contacts,
@@ -197,7 +199,7 @@ impl<'g, 'a> Tracing<'g, 'a> {
 
     /// Which contact an unknown belongs to.
     pub(super) fn contact_of(&self, unknown: usize) -> Option<usize> {
-        let Unknown::Row(row) = self.full.unknowns[unknown] else { return None };
+        let Unknown::Row(row) = self.plan.unknowns[unknown] else { return None };
         self.contacts.iter().position(|c| (c.row..c.row + c.rows()).contains(&row))
     }
 
@@ -353,11 +355,15 @@ fn take_early(limb: &mut Limb, (full, arithmetic): (&Plan, Arithmetic), contacts
         own.iter().zip(of_limb).for_each(|(contact, mode)| modes[*contact] = *mode);
         let plan = full.acting(&rows_that_act(full.dims.rows, contacts, &modes));
         let early = plan.early_contacts(arithmetic);
-        let at_ends = |plan: &Plan| {
-            let plan = plan.with_early_contacts(&early);
-            of_contacts(full).all(|index| !reaches_of(&plan, &full.constraints[index].slots, trunk))
-        };
-        !early.is_empty() && at_ends(&plan) && plan.accelerations.as_deref().is_none_or(at_ends)
+        if early.is_empty() {
+            return false;
+        }
+        let plan = plan.with_early_contacts(&early);
+        // Another elimination for accelerations has numbers of its own for the unknowns.
+        let plans = [(Some(&plan), Some(full)), (plan.accelerations.as_deref(), full.accelerations.as_deref())];
+        let mut plans = plans.into_iter().filter_map(|(plan, full)| plan.zip(full));
+        plans
+            .all(|(plan, full)| of_contacts(full).all(|index| !reaches_of(plan, &full.constraints[index].slots, trunk)))
     });
 }
 

@@ -19,7 +19,7 @@ use super::{vectors, CompileError};
 use crate::code::{compile, Code};
 use crate::model::{Gravity, Model};
 use crate::modes::OF_EACH_SET;
-use crate::options::{Arithmetic, Options};
+use crate::options::{Arithmetic, Options, Precision};
 use crate::output::{Output, OutputProgram, Sizes};
 use crate::plan::Plan;
 use crate::rolled::{rolled, together, Together};
@@ -115,6 +115,20 @@ impl<S: Number> Shared<S> {
     fn with_early_rows(self) -> Self {
         let early = self.plan.early_contacts(self.options.arithmetic);
         Shared { early: (!early.is_empty()).then(|| self.plan.with_early_contacts(&early)), ..self }
+    }
+
+    /// Whether code and interpreter give the same bits. In single precision, code has constants that were computed in double
+    /// precision, and the interpreter rounds in every step.
+    fn has_bits_of_interpreter(&self) -> bool {
+        (self.options.arithmetic, S::PRECISION) == (Arithmetic::Exact, Precision::F64)
+    }
+
+    /// The code of an output for one state, without early rows: that of the program which several states have.
+    pub(super) fn without_early_rows(&self, output: Output) -> Option<&MachineCode<S>> {
+        match self.early.is_some() && OF_EACH_SET.contains(&output) {
+            true => self.late(output),
+            false => self.output(output).ok(),
+        }
     }
 
     /// The code of an output that has early rows, without these.
@@ -229,8 +243,8 @@ impl<S: Number> Compiled<S> {
         })
     }
 
-    /// The same mechanism, whose traits are computed by the interpreter alone, for comparison. In exact arithmetic it
-    /// gives the same bits. [`Compiled::evaluate`] still runs machine code, [`Compiled::evaluate_or_interpret`] does not.
+    /// The same mechanism, whose traits are computed by the interpreter alone, for comparison. In exact arithmetic and double
+    /// precision it gives the same bits. [`Compiled::evaluate`] still runs machine code, [`Compiled::evaluate_or_interpret`] does not.
     #[must_use]
     pub fn interpreted(self) -> Self {
         Compiled { interpreted: true, asks: true, ..self }
@@ -240,7 +254,8 @@ impl<S: Number> Compiled<S> {
     pub const WORTHWHILE: u32 = 1000;
 
     /// The same mechanism, whose outputs are compiled after so many calls each. Until then the interpreter computes them:
-    /// code that is hardly used is not worth the time of making it. In exact arithmetic both give the same bits.
+    /// code that is hardly used is not worth the time of making it. In exact arithmetic and double precision both give the same
+    /// bits.
     #[must_use]
     pub fn compiled_after(self, calls: u32) -> Self {
         let asks = self.interpreted || calls > 0;
@@ -258,7 +273,8 @@ impl<S: Number> Compiled<S> {
     }
 
     /// The inputs beside the state: `tau`, `drive_q`, `drive_v`, `drive_a`, `wrenches`, `gravity`. They must keep their
-    /// lengths. Gravity is read only where the model says that it is an input.
+    /// lengths. Gravity must be left as it is unless the model says that it is an input: the code has it as a constant, the
+    /// interpreter, which serves outputs that are too large, reads it here.
     pub fn inputs(&mut self) -> &mut Interpreter<S> {
         self.interpreting()
     }
@@ -416,7 +432,7 @@ impl<S: Number> Compiled<S> {
         }
         self.patience > 0 && !self.patient(output) && {
             let made = || self.shared.outputs[output as usize].get().is_some();
-            !(self.shared.options.arithmetic == Arithmetic::Exact && made())
+            !(self.shared.has_bits_of_interpreter() && made())
         }
     }
 
@@ -502,7 +518,7 @@ impl<S: Number> Reducible for Compiled<S> {
     }
 
     fn way(&self) -> Way {
-        let exact = self.shared.options.arithmetic == Arithmetic::Exact;
+        let exact = self.shared.has_bits_of_interpreter();
         let patient = || self.calls.get(Output::Rates as usize).is_none_or(|n| *n >= self.patience);
         let compiled = !self.interpreted && (exact || patient());
         if compiled && self.shared.outputs[Output::Rates as usize].get().is_some_and(Result::is_ok) {

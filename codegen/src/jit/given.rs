@@ -51,11 +51,12 @@ impl<S: Number> Compiled<S> {
         &mut self.interpreter.tau
     }
 
-    /// Sets a field of the functions ([`FIELDS`], by its number); which rows act cannot be set.
+    /// Sets a field of the functions ([`FIELDS`], by its number); which rows act cannot be set, nor gravity that is no input.
     ///
     /// # Panics
     /// If it has another length.
     pub fn set_field(&mut self, field: usize, row: &[S]) {
+        let is_input = self.sizes().gravity > 0;
         let inputs = &mut self.interpreter;
         let to = match FIELDS[field].array.name {
             "params" => return self.set_parameters(row),
@@ -64,7 +65,7 @@ impl<S: Number> Compiled<S> {
             "drive_v" => &mut inputs.drive_v,
             "drive_a" => &mut inputs.drive_a,
             "wrenches" => inputs.wrenches.as_flattened_mut(),
-            "gravity" => &mut inputs.gravity,
+            "gravity" if is_input => &mut inputs.gravity,
             _ => return,
         };
         to.copy_from_slice(row);

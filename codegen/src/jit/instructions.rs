@@ -94,7 +94,18 @@ pub fn write(function: &mut Function, program: &OutputProgram<Code>, shape: &Sha
     let outputs = (0..shape.results.len()).map(|place| addresses(results, place)).collect();
     let sines = b.import_signature(shape.sines.0.clone());
     let number = of_lanes(shape.precision, shape.lanes);
-    let mut writer = Writer { b, shape, number, inputs, outputs, memory, constants: table, vectors: Vec::new(), sines };
+    let mut writer = Writer {
+        b,
+        shape,
+        number,
+        inputs,
+        outputs,
+        memory,
+        constants: table,
+        vectors: Vec::new(),
+        places: BTreeMap::new(),
+        sines,
+    };
     lower::lower(&mut writer, program, shape.results, shape.spills);
     let done = writer.b.ins().iconst(types::I32, 0);
     writer.b.ins().return_(&[done]);
@@ -131,6 +142,8 @@ struct Writer<'a> {
     constants: Value,
     /// Bits of the numbers of constant vectors.
     vectors: Vec<u64>,
+    /// Where each of them stands.
+    places: BTreeMap<u64, usize>,
     /// Signature of the function for sines and cosines.
     sines: SigRef,
 }
@@ -310,9 +323,9 @@ impl Instructions for Writer<'_> {
         let at = match self.number.is_vector() {
             false => self.shape.constants.get(&x.to_bits()).copied(),
             true => {
-                let known = self.vectors.iter().position(|bits| *bits == x.to_bits());
-                let k = known.unwrap_or(self.vectors.len());
-                if known.is_none() {
+                let next = self.vectors.len();
+                let k = *self.places.entry(x.to_bits()).or_insert(next);
+                if k == next {
                     self.vectors.push(x.to_bits());
                 }
                 Some(self.shape.vectors + k * self.number.lane_count() as usize)

@@ -1,8 +1,9 @@
 //! Machine code at run time, for models that are known at run time only (feature `jit`).
 //!
 //! The programs are those of generated Rust. Machine code of them is made in milliseconds, without a compiler on the
-//! machine: on x86-64 processors with AVX2 and FMA and in double precision by this crate itself, elsewhere by Cranelift. With [`Arithmetic::Exact`](crate::options::Arithmetic::Exact) the code gives the bits of the
-//! interpreter, up to the sign of zero.
+//! machine: on x86-64 processors with AVX2 and FMA and in double precision by this crate itself, elsewhere by Cranelift. With
+//! [`Arithmetic::Exact`](crate::options::Arithmetic::Exact) the code gives the bits of the interpreter in double precision, up
+//! to the sign of zero.
 //!
 //! ```
 //! use mbd_codegen::jit::Compiled;

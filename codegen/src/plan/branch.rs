@@ -94,7 +94,9 @@ impl Plan {
                     .map(|list| list.iter().map(&mut place).collect::<Vec<usize>>()),
             ));
         }
-        letters.extend(self.wrenches.iter().map(|_| 'w'));
+        for &(frame, axes) in &self.wrenches {
+            letters.push_str(&format!("w{:?}{axes:?}", self.frames[frame].node));
+        }
         self.constraints.iter().for_each(|c| letters.push_str(&c.letters()));
         letters
     }

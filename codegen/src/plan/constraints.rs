@@ -182,15 +182,13 @@ fn open(plan: &mut Plan, slots: &[usize], bond: &PlanBond, members: &[Option<usi
     };
     let at_ground = shared.iter().any(|g| plan.solve_at_ground.contains(g));
     let longest = ways.iter().max_by_key(|way| way.len()).cloned().unwrap_or_default();
+    // All ways end at the ground: where they have met, they are the same.
+    let same = |way: &Vec<usize>| longest.iter().rev().zip(way.iter().rev()).take_while(|(a, b)| a == b).count();
+    let met = &longest[longest.len() - ways.iter().map(same).min().unwrap_or(0)..];
     // A coordinate that is solved at its own node, as in a coupling, is eliminated before the row.
-    let base = longest.iter().copied().find(|i| {
-        let met = ways.iter().all(|way| way.contains(i));
-        let inboard = |k: usize| plan.ancestors(*i).iter().skip(1).any(|&a| a == k);
-        met && !at_ground && !(0..plan.nodes.len()).any(|k| inboard(k) && solved(k) > 0)
-    });
-    let opened: Vec<usize> = ways.iter().flatten().copied().collect();
-    let outboard = |i: usize| base.is_none_or(|b| i != b && plan.ancestors(i).contains(&b));
-    let opened: Vec<usize> = opened.into_iter().filter(|&i| outboard(i)).collect();
+    let first = met.iter().rposition(|&i| solved(i) > 0).unwrap_or(0);
+    let base = met.get(first).copied().filter(|_| !at_ground);
+    let opened = ways.iter().flat_map(|way| way.iter().copied().take_while(|i| Some(*i) != base));
     for i in opened {
         for g in slots {
             if !plan.nodes[i].elimination.open.contains(g) {

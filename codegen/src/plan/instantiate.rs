@@ -102,7 +102,7 @@ impl Plan {
     }
 
     /// The plan itself, or the one some rows of which act in it.
-    fn with_all_rows(&self) -> &Plan {
+    pub(crate) fn with_all_rows(&self) -> &Plan {
         if let RowsThatAct::Some(of) = &self.acts {
             &of.0
         } else {
@@ -187,7 +187,7 @@ impl Plan {
         let x = node.inertia.map(S::constant);
         let fixed =
             RigidInertia { mass: x[0], moment: [x[1], x[2], x[3]], inertia: [x[4], x[5], x[6], x[7], x[8], x[9]] };
-        node.variable.iter().fold(fixed, |sum, (b, pose)| sum.plus(&self.inertia_of_body(*b, pose, 0.0, params)))
+        node.variable.iter().fold(fixed, |sum, (b, pose)| sum.plus(&self.inertia_of_body(*b, pose, self.snap, params)))
     }
 
     /// Inertia of body `b` of the model at the frame in which it stands at `pose`, with given parameters; `snap` as in

@@ -52,7 +52,7 @@ pub fn rotation(r: &Rotation, snap: f64, notice: &mut dyn FnMut(f64)) -> Vec<Pos
     match *r {
         Rotation::Rpy([roll, pitch, yaw]) => {
             let steps = [about(Axis::Z, yaw), about(Axis::Y, pitch), about(Axis::X, roll)];
-            steps.into_iter().filter(|s| !matches!(s, PoseStep::Turn { c, .. } if *c == 1.0)).collect()
+            steps.into_iter().filter(|s| !matches!(s, PoseStep::Turn { c, s, .. } if [*c, *s] == [1.0, 0.0])).collect()
         }
         Rotation::AxisAngle { axis, angle } => {
             let spin = about(Axis::Z, angle);

@@ -384,11 +384,14 @@ impl PlanConstraint {
 
     /// The part of it that decides which elimination is best.
     pub(crate) fn letters(&self) -> String {
+        let decays = self.decay != Value::ZERO;
         match &self.bond {
             PlanBond::Cut { kind, frames, paths } => {
-                format!("c{:?}{:?}{paths:?}", std::mem::discriminant(kind), frames.each_ref().map(|f| f.node))
+                format!("c{:?}{:?}{paths:?}{decays}", std::mem::discriminant(kind), frames.each_ref().map(|f| f.node))
             }
-            PlanBond::Coupling { terms, .. } => format!("g{}", terms.len()),
+            PlanBond::Coupling { terms, .. } => {
+                format!("g{:?}{decays}", terms.iter().map(|(node, _)| *node).collect::<Vec<usize>>())
+            }
         }
     }
 }

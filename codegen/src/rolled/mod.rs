@@ -1,5 +1,4 @@
 //! Loop form: runs of like links as loops over tables of their constants, the rest of the tree as straight-line code.
-//! Loop form: runs of like links as loops over tables of their constants, the rest of the tree as straight-line code.
 //!
 //! Straight-line code of a long chain outgrows the instruction cache and takes long to compile. Here every pass of a
 //! group (leaves to base, base to leaves) walks the tree once; where it meets a run, one turn is traced on symbols by

@@ -406,8 +406,15 @@ impl Scalar for Expr<'_> {
     fn sqrt(self) -> Self {
         match self {
             Expr::Const(x) => Expr::Const(Scalar::sqrt(x)),
-            Expr::Node { neg: true, .. } => unreachable!("no sweep takes the root of a negative value"),
             Expr::Node { graph, id, neg: false } => graph.node(Op::Sqrt(id), false),
+            // The sign of a node is not that of its value: `1 − x` is stored as `−(x − 1)`.
+            Expr::Node { graph, id, neg: true } => {
+                let positive = match graph.get(id).0 {
+                    Op::Sub(a, b) => Op::Sub(b, a),
+                    _ => Op::Sub(Operand::Const(0), Operand::Node(id)),
+                };
+                graph.node(positive, false).sqrt()
+            }
         }
     }
 

@@ -1,7 +1,8 @@
 //! WebAssembly of the same programs as generated Rust, with a JavaScript wrapper and its types.
 //!
 //! A module imports nothing: sines and cosines of all angles are part of it. Arguments and results are in its memory, at
-//! the places that the wrapper lists in its comment at the top. In exact arithmetic it gives the bits of the interpreter.
+//! the places that the wrapper lists in its comment at the top. In exact arithmetic and double precision it gives the bits of
+//! the interpreter.
 //!
 //! ```
 //! use mbd_codegen::read::{self, ImportOptions};
@@ -97,7 +98,7 @@ fn files(plan: &Plan, options: &Options, number: Number) -> Result<GeneratedWasm
     if options.modes.is_some() {
         return Err(GenerateError::ModesNeedRust);
     }
-    let programs = Programs::new(plan, options)?;
+    let programs = Programs::new(plan, options)?.without_tables()?;
     let (input, functions) = (Input { plan, options, programs: &programs }, programs.functions());
     let layout = Layout::new(&input, &functions, number, 0);
     let wrapper = Wrapper::new(&input, &layout, &functions);

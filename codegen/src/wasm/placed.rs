@@ -43,7 +43,8 @@ impl PlacedArray {
 }
 
 /// A module for one output, for one state, with the eliminations of a plan; [`Options::plan`] only says where code is
-/// rolled. `reserve` gives the address, a multiple of 16, of so many bytes of the host's memory that nobody else uses.
+/// rolled. `reserve` gives the address, a multiple of 16, of so many bytes of the host's memory that nobody else uses and that are
+/// zero.
 ///
 /// # Errors
 /// Those of [`crate::generate()`]. Nothing is reserved for a program with more than `most` operations: `None`.
@@ -68,6 +69,7 @@ pub fn place(
         factored: Vec::new(),
         together: Vec::new(),
     };
+    let programs = programs.without_tables()?;
     let (input, functions) = (Input { plan, options, programs: &programs }, programs.functions());
     let number = Number::scalar(options.precision);
     let base = reserve(Layout::new(&input, &functions, number, 0).len);

@@ -115,6 +115,7 @@ impl<S: Real> Constrained for Interpreter<S> {
         let changed = self.tree.reorder_rows(&at);
         if self.physical.reorder_rows(&at) || changed {
             self.work = Workspace::new(&self.tree);
+            self.other_work = Self::other_work(&self.tree);
             self.derivatives = None;
         }
         changed

@@ -350,7 +350,8 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
     /// Compliance of row `r`.
     pub(super) fn compliance(&self, r: usize) -> S {
         // Eliminations are tried on parts of a tree, which have rows of constraints that are not their own.
-        let own = self.tree.constraints.iter().find(|c| c.range().contains(&r));
+        let at = self.tree.constraints.partition_point(|c| c.range().end <= r);
+        let own = self.tree.constraints.get(at).filter(|c| c.range().contains(&r));
         own.and_then(|c| c.compliance).unwrap_or(S::zero())
     }
 

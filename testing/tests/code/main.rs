@@ -14,6 +14,7 @@ mod fuzzed;
 mod machine_code;
 mod rewriting;
 mod rolled;
+mod row_numbers;
 mod together;
 mod wasm;
 mod wide;

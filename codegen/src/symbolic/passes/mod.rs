@@ -93,16 +93,8 @@ fn fewest(a: Program, b: Program) -> Program {
     }
 }
 
-/// Reduces the number of operations: takes out common factors and common pairs in turn, until neither saves any.
-pub fn fewer(program: Program) -> Program {
-    match with_fewer(program) {
-        (collected, Some(plain)) => fewest(collected, plain),
-        (collected, None) => collected,
-    }
-}
-
-/// [`fewer`] with equal terms collected and, if there are any, without: then a pair may be gone that other sums would
-/// have shared.
+/// Reduces the number of operations: takes out common factors and common pairs in turn, until neither saves any. With equal
+/// terms collected and, if there are any, without: then a pair may be gone that other sums would have shared.
 fn with_fewer(program: Program) -> (Program, Option<Program>) {
     let collects = Cell::new(false);
     let collected = rounds(program.clone(), Some(&collects));
@@ -123,6 +115,13 @@ fn rounds(mut program: Program, collects: Option<&Cell<bool>>) -> Program {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn fewer(program: Program) -> Program {
+        match with_fewer(program) {
+            (collected, Some(plain)) => fewest(collected, plain),
+            (collected, None) => collected,
+        }
+    }
 
     #[test]
     fn values_stay() {

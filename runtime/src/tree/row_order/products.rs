@@ -29,14 +29,14 @@ impl RowProducts {
         let (mut residual, mut entries) = (interpreter.zero_rows(), interpreter.zero_entries());
         interpreter.constraint_residuals(q, &mut residual, &mut entries);
         let nv = interpreter.tree().dims.nv;
-        let mut mass = vec![S::zero(); nv * nv];
-        interpreter.mass_matrix(q, &mut mass);
+        let mut mass = vec![S::zero(); nv];
+        interpreter.mass_diagonal(q, &mut mass);
         let columns = interpreter.entry_columns();
         let dense = |row: &crate::system::Row| {
             let mut dense = vec![0.0; nv];
             for k in row.first..row.first + row.len {
                 let v = columns[k];
-                let own = mass[v * nv + v].to_f64();
+                let own = mass[v].to_f64();
                 dense[v] += entries[k].to_f64() / if own > 0.0 { libm::sqrt(own) } else { 1.0 };
             }
             dense
