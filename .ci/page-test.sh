@@ -4,10 +4,7 @@
 # minute. With `--quick`, which is part of `.ci/run`, a few of them. `.ci/page.sh` makes the files.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-if ! command -v node > /dev/null; then
-    apt-get update -q
-    DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends nodejs
-fi
+bash .ci/node.sh
 # An installation that is interrupted would leave a mess, a download does not.
 if ! command -v chromium > /dev/null && [ "$(id -u)" = 0 ] && command -v apt-get > /dev/null; then
     install=(apt-get install -y -q --no-install-recommends chromium)

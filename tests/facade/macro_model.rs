@@ -8,6 +8,12 @@ use multibody::runtime::integrate::{Gauss16, Rk4, Solver, Step, Stepper, Toleran
 use multibody::runtime::system::Part;
 use multibody::runtime::{Interpreter, System};
 
+/// Types with names that generated code has for other things.
+pub mod odd_names {
+    multibody::mbd_model! { path = "models/double_pendulum.toml", name = P0, outputs = [rates] }
+    multibody::mbd_model! { path = "models/double_pendulum.toml", name = Option, outputs = [rates] }
+}
+
 /// Types in a public module, as users have them.
 pub mod made {
     // There are several types in one module, and the module imports nothing.

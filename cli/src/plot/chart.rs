@@ -66,8 +66,8 @@ impl Chart {
             let list: Vec<String> = points.iter().map(|[x, y]| format!("{x:.1} {y:.1}")).collect();
             match list.len() {
                 0 => {}
-                // A dot, drawn by the ends of a line.
-                1 => drop(write!(d, "M{0}h.1", list[0])),
+                // A dot: a line of three pixels.
+                1 => drop(write!(d, "M{:.1} {:.1}h3", points[0][0] - 1.5, points[0][1])),
                 _ => drop(write!(d, "M{}", list.join("L"))),
             }
         }

@@ -11,7 +11,7 @@ use super::shapes::a as with_article;
 use crate::import::raw::{RawContact, RawModel, RawNumber, RawSurface};
 use crate::import::source::{Findings, Span, Spanned};
 use crate::import::words::{did_you_mean, list, quote};
-use crate::model::{Body, ConstraintKind, Contact, Freedom, Joint, Shape, ShapeKind, Unit};
+use crate::model::{Body, ConstraintKind, Contact, Joint, Shape, ShapeKind};
 use crate::names::identifier;
 
 /// Coefficients of friction above this one are suspicious: racing tyres have 2.
@@ -401,9 +401,8 @@ fn catches([a, b]: [&Shape; 2]) -> bool {
 /// Pairs of bodies (as roots of what is welded together) that one joint connects. A joint to the ground that lets its
 /// body travel makes no neighbours: what falls onto the floor hangs on such a joint.
 fn neighbours(joints: &[Joint], welded: &[Option<usize>]) -> HashSet<(Option<usize>, Option<usize>)> {
-    let travels = |j: &Joint| j.kind.spec().freedoms.iter().any(|f: &Freedom| f.unit == Unit::Metre);
     let pair = |j: &Joint| (j.parent.and_then(|b| welded[b]), welded[j.child]);
-    joints.iter().filter(|j| !(travels(j) && pair(j).0.is_none())).map(pair).collect()
+    joints.iter().filter(|j| !(j.travels() && pair(j).0.is_none())).map(pair).collect()
 }
 
 /// Reports numbered contacts, contacts of pairs and stops whose names are taken. Names that stand in the file are

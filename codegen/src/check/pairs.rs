@@ -10,7 +10,7 @@ use crate::import::raw::{RawModel, RawPairs};
 use crate::import::source::{Findings, Span, Spanned};
 use crate::import::taken::Taken;
 use crate::import::words::{list_of, SHOWN};
-use crate::model::{Contact, Freedom, Joint, Model, ShapeKind, Unit, Value};
+use crate::model::{Contact, Model, ShapeKind, Value};
 
 /// Most contacts of a pair that the file does not list: a rod and a box have 14.
 const DEAR: usize = 32;
@@ -259,7 +259,7 @@ impl Bodies {
                 Some(b) if !solid[b] => hangs[b],
                 _ => (carrier, false),
             };
-            let moving = moving || travels(joint);
+            let moving = moving || joint.travels();
             hangs[joint.child] = (on, moving);
             if solid[joint.child] && !(moving && on.is_none()) {
                 joined.insert([on, Some(joint.child)]);
@@ -277,8 +277,4 @@ impl Bodies {
         let [a, b] = on.map(|body| body.and_then(|b| self.welded[b]));
         self.joined.contains(&[a, b]) || self.joined.contains(&[b, a])
     }
-}
-
-fn travels(joint: &Joint) -> bool {
-    joint.kind.spec().freedoms.iter().any(|f: &Freedom| f.unit == Unit::Metre)
 }

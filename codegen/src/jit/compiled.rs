@@ -85,7 +85,7 @@ const REDUCED: usize = 256;
 pub(super) struct Shared<S> {
     plan: Plan,
     /// The same with [early rows](Plan::with_early_contacts), for one state and the outputs [`OF_EACH_SET`].
-    early: Option<Plan>,
+    pub(super) early: Option<Plan>,
     options: Options,
     sizes: Sizes,
     /// One for each of [`Output::ALL`].

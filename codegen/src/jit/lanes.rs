@@ -262,6 +262,8 @@ mod tests {
     use crate::plan::Plan;
     use crate::read::{model, ImportOptions};
     use crate::sample::State;
+    use mbd_runtime::contact::Reducible;
+    use mbd_runtime::system::Conjugate;
 
     /// All lanes have the bits of single states: of a tree, of a chain in rolled code, with parameters, with loops.
     #[test]
@@ -289,6 +291,52 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// A robot whose feet stand, whose code for one state has early rows, takes angles beyond the main path of sines in lanes.
+    #[test]
+    fn lanes_of_a_robot_that_stands_take_large_angles() {
+        let text = include_str!("../../../models/contacts/quadruped_hop.toml");
+        let model = model("quadruped_hop.toml", text, &ImportOptions::default()).expect("a sound model").model;
+        let full = Plan::new(&model, 1e-9).with_contacts();
+        let robot = Compiled::<f64>::from_plan(full.clone(), Options::default().of_model(true)).expect("machine code");
+        let feet = (1..=full.dims.rows).map(|n| (0..full.dims.rows).map(|r| r < n).collect::<Vec<bool>>());
+        let early = |acts: Vec<bool>| Some(Reducible::acting(&robot, &acts)).filter(|on| on.shared.early.is_some());
+        let mut standing = feet.rev().find_map(early).expect("some code for one state has early rows");
+        let state = State::new(&full, 1);
+        let mut q = state.q.clone();
+        *q.last_mut().expect("coordinates") = 2e6;
+        let (mut qd, mut pd) = (q.clone(), state.v.clone());
+        standing.rates_at(0.0, &q, &state.v, &mut qd, &mut pd);
+        let mut lanes = standing.lanes::<2>().expect("machine code for lanes");
+        let pack = |x: &[f64]| x.iter().map(|x| Packed([*x; 2])).collect::<Vec<Packed<2>>>();
+        let (mut found_qd, mut found_pd) = (pack(&qd), pack(&pd));
+        lanes.rates_at(Packed::zero(), &pack(&q), &pack(&state.v), &mut found_qd, &mut found_pd);
+        let size = pd.iter().fold(1.0_f64, |most, x| most.max(x.abs()));
+        for (found, wanted) in found_qd.iter().zip(&qd).chain(found_pd.iter().zip(&pd)) {
+            // Another order of elimination has other rounding errors.
+            assert!(found.0.iter().all(|x| (x - wanted).abs() < 1e-9 * size), "{found:?} {wanted}");
+        }
+    }
+
+    /// In single precision, code has other bits than the interpreter: which computes does not depend on other clones.
+    #[test]
+    fn code_of_another_clone_is_not_taken_in_single_precision() {
+        let text = include_str!("../../../models/ur5.urdf");
+        let model = model("ur5.urdf", text, &ImportOptions::default()).expect("a sound model").model;
+        let options = Options { arithmetic: Arithmetic::Exact, ..Options::default() };
+        let patient = Compiled::<f32>::new(&model, &options).expect("machine code").compiled_after(3);
+        let (q, v) = (vec![0.3; 6], vec![0.7; 6]);
+        let momenta = |of: &mut Compiled<f32>| {
+            let mut p = of.zero_momenta();
+            of.conjugate_momenta(&q, &v, &mut p);
+            p
+        };
+        let wanted = momenta(&mut patient.clone().interpreted());
+        let mut other = patient.clone();
+        (0..5).for_each(|_| drop(momenta(&mut other)));
+        assert_ne!(momenta(&mut other), wanted, "the code has other bits");
+        assert_eq!(momenta(&mut patient.clone()), wanted);
     }
 
     fn compare<const L: usize>(file: &str, single: Compiled, plan: &Plan) {

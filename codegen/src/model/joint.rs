@@ -431,6 +431,11 @@ pub struct JointBounds {
 }
 
 impl Joint {
+    /// Whether the origin of its body moves with it.
+    pub(crate) fn travels(&self) -> bool {
+        self.kind.spec().freedoms.iter().any(|freedom| freedom.unit == Unit::Metre)
+    }
+
     /// A free joint without passive elements that was not read from a text.
     pub fn new(
         name: impl Into<String>,

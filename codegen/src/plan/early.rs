@@ -21,6 +21,7 @@ use std::collections::BTreeSet;
 use mbd_runtime::tree::row_order::{early_rows, not_followed};
 use mbd_runtime::tree::{Elimination, Unknown};
 
+use super::paths::children;
 use super::row_order::products;
 use super::structure::{Plan, PlanBond, PlanConstraint, RowsThatAct};
 use crate::options::Arithmetic;
@@ -106,8 +107,7 @@ fn rows_of_trunks(plan: &Plan) -> Vec<(usize, usize)> {
 fn leg_of(plan: &Plan, constraint: &PlanConstraint, only: bool) -> Option<usize> {
     let PlanBond::Cut { frames, .. } = &constraint.bond else { return None };
     let ([None, Some(foot)] | [Some(foot), None]) = [frames[0].node, frames[1].node] else { return None };
-    let mut children = vec![0; plan.nodes.len()];
-    plan.nodes.iter().filter_map(|node| node.parent).for_each(|parent| children[parent] += 1);
+    let children = children(plan);
     let way = plan.ancestors(foot);
     let begins = |i: &usize| plan.nodes[*i].parent.is_some_and(|trunk| children[trunk] > 1);
     let third = (way.len() >= LONG_CHAIN).then(|| way[way.len() / 3 - 1]);

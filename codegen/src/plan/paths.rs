@@ -5,7 +5,7 @@ use mbd_runtime::tree::{Elimination, Kind, Source, Unknown};
 use super::structure::{Plan, PlanNode, PoseStep};
 
 /// Number of children of every node.
-fn children(plan: &Plan) -> Vec<usize> {
+pub(super) fn children(plan: &Plan) -> Vec<usize> {
     let mut children = vec![0; plan.nodes.len()];
     for parent in plan.nodes.iter().filter_map(|n| n.parent) {
         children[parent] += 1;

@@ -499,4 +499,16 @@ mod tests {
         assert_ne!(x.look_up(&TABLE, 1).split(), x.look_up(&TABLE, 0).split());
         assert_ne!(x.look_up(&TABLE, 1).split(), (-x).look_up(&TABLE, 1).split());
     }
+
+    /// The sign that is stored with a node is not that of its value.
+    #[test]
+    fn roots_of_differences_are_those_of_their_values() {
+        let graph = Graph::default();
+        let [x, y, z] = [0, 1, 2].map(|k| graph.input(k));
+        let results = [Expr::Const(1.0) - x * x, y - x, -(-y - x), -(x * z)].map(Scalar::sqrt);
+        let program = crate::symbolic::Program::new(&graph, &results);
+        let [x, y, z] = [0.3_f64, 0.7, -0.5];
+        let wanted = [1.0 - x * x, y - x, y + x, -(x * z)].map(f64::sqrt);
+        assert_eq!(program.evaluate(&[x, y, z], |a, b, c| a * b + c), wanted);
+    }
 }

@@ -189,6 +189,16 @@ fn seconds(all: &[Measured]) -> String {
     text
 }
 
+/// Value at `x` on the lines between points, whose first numbers grow; not a number outside.
+fn between(points: &[[f64; 2]], x: f64) -> f64 {
+    let next = points.partition_point(|point| point[0] < x);
+    match (next.checked_sub(1).and_then(|k| points.get(k)), points.get(next)) {
+        (_, Some(&[x1, y1])) if x1 == x => y1,
+        (Some(&[x0, y0]), Some(&[x1, y1])) => y0 + (y1 - y0) * (x - x0) / (x1 - x0),
+        _ => f64::NAN,
+    }
+}
+
 /// Figures 7.4 to 7.6.
 fn figures(all: &[Measured], path: &std::path::Path, out: &mut dyn Write) -> Outcome {
     let mut draw = |name: &str, title: &str, label: &str, value: &dyn Fn(&Measured) -> f64| {
@@ -196,8 +206,8 @@ fn figures(all: &[Measured], path: &std::path::Path, out: &mut dyn Write) -> Out
         t.sort_by(f64::total_cmp);
         t.dedup();
         let line = |family: &str| {
-            let at = |n: &f64| of(all, family).find(|m| m.n as f64 == *n).map_or(f64::NAN, value);
-            (family.to_string(), t.iter().map(at).collect())
+            let own: Vec<[f64; 2]> = of(all, family).map(|m| [m.n as f64, value(m)]).collect();
+            (family.to_string(), t.iter().map(|n| between(&own, *n)).collect())
         };
         let panel = Panel::new(label, t.clone(), FAMILIES.map(line).into());
         figure(out, path, name, title, "number of links", &[panel])

@@ -9,6 +9,7 @@ use mbd_codegen::options::{PlanOptions, DEFAULT_SNAP};
 use mbd_codegen::plan::Plan;
 use mbd_codegen::read;
 use mbd_codegen::search;
+use mbd_runtime::sweep::FrameState;
 use mbd_testing::conformance::evaluate;
 use mbd_testing::eliminations::random_plan;
 use mbd_testing::state::random_state;
@@ -87,4 +88,50 @@ fn rows_that_are_added_after_the_search_have_numbers_of_their_own_for_accelerati
         assert!(factored(&full, Output::Multipliers, &Options::default()).is_some(), "seed {seed}");
     }
     assert!(other > 5, "{other} plans have another number of unknowns for accelerations");
+}
+
+#[test]
+fn contacts_keep_their_rows_in_plans_in_which_some_rows_act() {
+    let full = Plan::new(&chain(), DEFAULT_SNAP).with_contacts();
+    let rows = |plan: &Plan| plan.contacts::<f64>().iter().map(|contact| contact.row).collect::<Vec<usize>>();
+    for row in 0..=full.dims.rows {
+        let acts: Vec<bool> = (0..full.dims.rows).map(|r| r == row).collect();
+        assert_eq!(rows(&full.acting(&acts)), rows(&full), "{acts:?}");
+    }
+}
+
+/// Without snapping, every angle of the description is there; with it, numbers and parameters alike.
+#[test]
+fn angles_are_snapped_as_asked() {
+    let read =
+        |text: &str| read::model("model.toml", text, &Default::default()).unwrap_or_else(|e| panic!("{e}")).model;
+    let text = "[[body]]
+name = \"link\"
+mass = 2
+inertia = [0.1, 0.2, 0.3]
+inertia_rpy = [1.5707963, 0, 0]
+
+[[joint]]
+name = \"pin\"
+type = \"revolute\"
+child = \"link\"
+rpy = [0, 0, 5e-9]
+axis = [1, 0, 0]
+";
+    let model = read(text);
+    let turned = |snap: f64| {
+        let plan = Plan::new(&model, snap);
+        let mut i = plan.default_interpreter::<f64>();
+        let mut frames = vec![FrameState::ground(); plan.frames.len()];
+        i.frames(&[0.0], &[0.0], &mut frames);
+        frames[0].rotation[1][0]
+    };
+    assert_eq!(turned(0.0), 5e-9);
+    assert_eq!(turned(DEFAULT_SNAP), 0.0);
+    let with_parameter = read(&format!("[params]\nm = 2\n\n{}", text.replace("mass = 2", "mass = { param = \"m\" }")));
+    let moments = [&model, &with_parameter].map(|model| {
+        let plan = Plan::new(model, DEFAULT_SNAP);
+        plan.tree::<f64>(&plan.default_params()).nodes[0].inertia.inertia
+    });
+    assert_eq!(moments[0], moments[1]);
 }
