@@ -245,7 +245,9 @@ impl<S: Scalar> Interpreter<S> {
     pub fn reactions(&mut self, q: &[S], v: &[S], a: &mut [S], wrenches: &mut [[S; 6]]) {
         self.accelerations(q, v, a);
         let sweeps = Sweeps { tree: &self.physical, trace: &() };
-        sweeps.reactions(q, v, a, &inputs!(self), &mut self.work, wrenches);
+        // It has the multipliers.
+        let work = self.other_work.as_deref_mut().unwrap_or(&mut self.work);
+        sweeps.reactions(q, v, a, &inputs!(self), work, wrenches);
     }
 
     /// `(q, v, v̇) → τ = M v̇ + h`. The joint forces of the inputs are not read.
