@@ -6,6 +6,7 @@ pub mod chains;
 pub mod closed;
 pub mod conformance;
 pub mod eliminations;
+mod errors;
 pub mod fused;
 pub mod instances;
 pub mod kkt;
@@ -16,6 +17,8 @@ pub mod random;
 pub mod state;
 pub mod toml;
 mod touching;
+
+pub use errors::{largest, largest_difference, relative_error};
 
 use mbd_codegen::model::{ConstraintKind, Gravity, JointMotion, Model, Placement, Rotation, Value};
 

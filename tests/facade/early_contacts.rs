@@ -25,7 +25,11 @@ fn model() -> Model {
 
 /// The largest difference, as a part of the largest number.
 fn error(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
+    // Maxima pass over what is not a number.
+    assert!(a.iter().chain(b).all(|x| x.is_finite()), "{a:?} {b:?}");
     let largest = b.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    assert!(largest > 0.0);
     a.iter().zip(b).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs())) / largest
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::run::{bad, err, files, folder, good, is_there, read, run_in, write, ROOT};
+use crate::run::{bad, err, files, folder, good, is_there, read, run_in, skipped, write, ROOT};
 
 const STRICT: [&str; 8] =
     ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror", "-O2", "-ffp-contract=fast"];
@@ -118,12 +118,12 @@ fn fmpy_simulates_the_unit() {
         &["leave out the contacts and stops"],
     );
     if err(&first).contains("no shared library") {
-        return eprintln!("skipped: no shared library was made");
+        return skipped("no shared library was made");
     }
     let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".to_string());
     let has_fmpy = Command::new(&python).args(["-c", "import fmpy"]).output().is_ok_and(|o| o.status.success());
     if !has_fmpy {
-        return eprintln!("skipped: `{python}` has no FMPy (pip install fmpy; PYTHON chooses the interpreter)");
+        return skipped(&format!("`{python}` has no FMPy (pip install fmpy; PYTHON chooses the interpreter)"));
     }
     let text = printed(Command::new(python).current_dir(&folder).args(["-c", FMPY]));
     let found: Vec<f64> = text.split_whitespace().map(|x| x.parse().expect("a number")).collect();

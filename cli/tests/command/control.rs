@@ -313,7 +313,7 @@ fn mistakes_in_tables_are_told_all_at_once() {
 /// The gain of a joint counts wherever it stands, and a column is written once.
 #[test]
 fn gains_have_no_order() {
-    let folder = folder("control_gains");
+    let folder = folder("control_gains_order");
     let model = write(&folder, "pendulum.toml", PENDULUM);
     let table = |gains: &str| {
         let arguments = ["simulate", &model, "--time", "0.2", "--kp", gains, "--kd", "1", "--columns", "q,v,q,q.hinge"];
@@ -331,11 +331,10 @@ fn gains_have_no_order() {
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_writes_what_it_has() {
-    use std::time::Duration;
     let folder = folder("control_interrupt");
     let model = write(&folder, "pendulum.toml", PENDULUM);
     let mut child = crate::run::start_in(&folder, &["simulate", &model, "--time", "1e5", "--every", "0.1"]);
-    std::thread::sleep(Duration::from_secs(2));
+    crate::run::wait_until_it_computes(&mut child);
     let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(kill.expect("kill").success());
     let status = child.wait().expect("an end");

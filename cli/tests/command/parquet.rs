@@ -55,7 +55,7 @@ fn an_interrupted_run_leaves_a_parquet_file() {
     let model = format!("{ROOT}/models/double_pendulum.toml");
     let arguments = ["simulate", &model, "--time", "1e5", "--every", "0.1", "--csv", NAME];
     let mut child = crate::run::start_in(&folder, &arguments);
-    std::thread::sleep(std::time::Duration::from_secs(2));
+    crate::run::wait_until_it_computes(&mut child);
     let kill = std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     assert!(kill.expect("kill").success());
     assert_eq!(child.wait().expect("an end").code(), Some(130));

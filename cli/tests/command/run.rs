@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
@@ -40,6 +41,33 @@ pub fn start_in(folder: &Path, arguments: &[&str]) -> std::process::Child {
     let silent = std::process::Stdio::null;
     let mut command = Command::new(PROGRAM);
     command.current_dir(folder).args(arguments).stdout(silent()).stderr(silent()).spawn().expect("the program runs")
+}
+
+/// Waits until a command listens to interrupts and has computed for a second since, where the system tells; otherwise two
+/// seconds.
+pub fn wait_until_it_computes(command: &mut std::process::Child) {
+    let id = command.id();
+    let told = |file: &str| std::fs::read_to_string(format!("/proc/{id}/{file}")).ok();
+    // The signals that are handled, bit by bit.
+    let listens = || {
+        let status = told("status")?;
+        let handled = status.lines().find_map(|line| line.strip_prefix("SigCgt:"))?;
+        Some(u64::from_str_radix(handled.trim(), 16).ok()? & (1 << 1) != 0)
+    };
+    // Hundredths of a second that the processor has spent; the name of the program is one word.
+    let spent = || told("stat")?.split(' ').nth(13)?.parse::<u64>().ok();
+    if listens().and(spent()).is_none() {
+        return std::thread::sleep(Duration::from_secs(2));
+    }
+    let (start, mut before) = (Instant::now(), None);
+    while before.is_none_or(|before| spent().is_some_and(|now| now < before + 100)) {
+        if listens() == Some(true) {
+            before = before.or(spent());
+        }
+        assert!(start.elapsed() < Duration::from_secs(120), "the command does not compute");
+        assert!(matches!(command.try_wait(), Ok(None)), "the command has ended");
+        std::thread::sleep(Duration::from_millis(20));
+    }
 }
 
 /// Runs the executable in the root of the repository.
@@ -103,11 +131,20 @@ pub fn json_of(output: &Output) -> Value {
     serde_json::from_str(out(output)).expect("JSON")
 }
 
-/// Whether a program is there; a message says so if not.
+/// Says that a test, or a part of one, is skipped.
+///
+/// # Panics
+/// With `MBD_TEST_ALL=1` in the environment: then nothing may be.
+pub fn skipped(why: &str) {
+    assert!(std::env::var("MBD_TEST_ALL").as_deref() != Ok("1"), "{why}");
+    eprintln!("skipped: {why}");
+}
+
+/// Whether a program is there; if not, that is [`skipped`] which needs it.
 pub fn is_there(program: &str) -> bool {
     let there = Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success());
     if !there {
-        eprintln!("skipped: `{program}` is not there");
+        skipped(&format!("`{program}` is not there"));
     }
     there
 }

@@ -205,6 +205,50 @@ fn nothing_known_stays_nothing() {
 }
 
 #[test]
+fn intersections() {
+    let of = |low: f64, high: f64| Interval::new(low, high).expect("bounds");
+    let (a, entire) = (of(-1.0, 2.0), Interval::ENTIRE);
+    for (b, both) in [
+        (of(1.0, 3.0), Some(of(1.0, 2.0))),
+        (of(-3.0, 0.5), Some(of(-1.0, 0.5))),
+        (of(0.0, 1.0), Some(of(0.0, 1.0))),
+        (of(-7.0, 7.0), Some(a)),
+        (a, Some(a)),
+        // They have a bound in common.
+        (of(2.0, 3.0), Some(Interval::point(2.0))),
+        (Interval::point(-1.0), Some(Interval::point(-1.0))),
+        // Nothing known takes nothing away.
+        (entire, Some(a)),
+        // Disjoint, also by one unit of the last place.
+        (of(2.5, 3.0), None),
+        (of(-9.0, -1.5), None),
+        (of(next_up(2.0), 3.0), None),
+        (Interval::point(next_down(-1.0)), None),
+    ] {
+        assert_eq!(a.intersection(b), both, "{b:?}");
+        assert_eq!(b.intersection(a), both, "{b:?}");
+    }
+    assert_eq!(entire.intersection(entire), Some(entire));
+    // Numbers of both, and only these.
+    let mut random = Random(11);
+    let mut counts = [0; 2];
+    for _ in 0..2000 {
+        let mut draw = || {
+            let (x, y) = (random.short(), random.short());
+            of(x.min(y), x.max(y))
+        };
+        let (a, b) = (draw(), draw());
+        let both = a.intersection(b);
+        counts[usize::from(both.is_some())] += 1;
+        for k in -33..=33 {
+            let x = f64::from(k);
+            assert_eq!(both.is_some_and(|both| both.contains(x)), a.contains(x) && b.contains(x), "{a:?} {b:?} {x}");
+        }
+    }
+    assert!(counts.iter().all(|count| *count > 300), "{counts:?}");
+}
+
+#[test]
 fn constants_of_a_hundred_bits() {
     let third = crate::integrate::ratio(1, 3);
     let x: Interval = third.get();

@@ -6,4 +6,5 @@ mod events;
 mod multistep;
 mod schemes;
 mod solver;
+mod switching;
 mod systems;

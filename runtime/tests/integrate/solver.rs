@@ -1,11 +1,13 @@
 //! The solver: tolerances, exact ends of runs, limits, kinds of failures, order of dense output.
 
+use std::cell::Cell;
+
 use super::systems::*;
 use mbd_runtime::constrained::{ConstraintError, PostStep, WithPostStep};
 use mbd_runtime::integrate::tableau;
 use mbd_runtime::integrate::{
     CashKarp, Dop853, Euler, Midpoint, Rk4, Rkf45, Solver, Statistics, Step, StepError, Stepper, Tolerance, Tolerances,
-    Tsit5, Verner9,
+    Tsit5, VariableAdams, Verner9,
 };
 use mbd_runtime::System;
 
@@ -236,8 +238,71 @@ fn limits_are_kept() {
         let mut solver = adaptive(&mut y, method, 1e-6, (&[2.0], &[0.0]));
         solver.limits.max_step = h;
         let ended = run(&mut solver, &mut y, 1.0);
-        assert!(matches!(ended, Err(StepError::InvalidStep { .. })) || h.is_nan(), "{h}: {ended:?}");
+        if h.is_nan() {
+            // What is no number is no limit.
+            let method = Tsit5::new(&y);
+            let free = run(&mut adaptive(&mut y, method, 1e-6, (&[2.0], &[0.0])), &mut y, 1.0);
+            assert!(ended.is_ok() && ended == free, "{ended:?} {free:?}");
+        } else {
+            assert!(matches!(ended, Err(StepError::InvalidStep { .. })), "{h}: {ended:?}");
+        }
     }
+}
+
+/// After a kick, and with another force from then on, a motion goes on as that of a new solver does: nothing is left of what
+/// came before. Where the largest momentum is that of the kick, too, bit for bit.
+pub(super) fn goes_on_as_new<Y, M>(name: &str, mut y: Y, force: &Cell<f64>, make: impl Fn(&Y) -> M, factor: f64)
+where
+    Y: System<Scalar = f64, Coordinates = [f64; 1], Momenta = [f64; 1]>,
+    M: Stepper<Y>,
+{
+    let tolerance = 1e-9;
+    // Before, no momentum is larger than 3.
+    for (kick, same) in [(-5.0, true), (0.2, false)] {
+        force.set(0.0);
+        let method = make(&y);
+        let mut solver = adaptive(&mut y, method, tolerance, (&[2.0], &[0.0]));
+        let before = run(&mut solver, &mut y, 1.0).expect("a run");
+        assert!(before[1].abs() < 3.0, "{name}: {before:?}");
+        force.set(0.7);
+        let (q, p) = ([before[0]], [before[1] + kick]);
+        solver.resume(&mut y, 1.0, &q, &p).expect("a state");
+        let at = |solver: &mut Solver<Y, M>, theta: f64, y: &mut Y| {
+            let (mut q, mut p) = ([f64::NAN], [f64::NAN]);
+            solver.dense(y, theta, &mut q, &mut p);
+            [q[0], p[0]]
+        };
+        // There is no step to look into, only the state.
+        for theta in [0.0, 0.3, 1.0] {
+            assert_eq!(at(&mut solver, theta, &mut y), [q[0], p[0]], "{name}: {kick}, {theta}");
+        }
+        assert_eq!((solver.time(), solver.last_step()), (1.0, (1.0, 0.0)), "{name}");
+        let method = make(&y);
+        let step = Step::Adaptive(Tolerances::new(tolerance));
+        let mut new = Solver::new(&mut y, method, step, 1.0, &q, &p).expect("a start");
+        solver.advance(&mut y, 4.0).expect("a step");
+        new.advance(&mut y, 4.0).expect("a step");
+        assert_eq!(at(&mut solver, 0.0, &mut y), [q[0], p[0]], "{name}: {kick}");
+        if same {
+            assert_eq!(solver.last_step(), new.last_step(), "{name}");
+            for theta in [0.2, 0.5, 0.9, 1.0] {
+                assert_eq!(at(&mut solver, theta, &mut y), at(&mut new, theta, &mut y), "{name}: {theta}");
+            }
+        }
+        let ends = [&mut solver, &mut new].map(|solver| run(solver, &mut y, 4.0).expect("a run"));
+        let off = apart(&ends[0], &ends[1]);
+        println!("{name}: {kick}: {off:e}");
+        // Both err by some tolerances.
+        assert!(if same { ends[0] == ends[1] } else { off < 2.0 * factor * tolerance }, "{name}: {kick}: {ends:?}");
+    }
+}
+
+#[test]
+fn a_motion_goes_on_after_a_kick() {
+    let force = Cell::new(0.0);
+    let pushed = || Plain::new(|_, q: &[f64; 1], p: &[f64; 1]| ([p[0]], [-q[0].sin() + force.get()]));
+    for_each!(name, make => { goes_on_as_new(name, pushed(), &force, |y| make!(y), factor(name)); });
+    goes_on_as_new("adams", pushed(), &force, |y| VariableAdams::new(y), 100.0);
 }
 
 /// What says nothing, or what no motion can begin with, is an error, not a motion without error control.

@@ -1,6 +1,6 @@
 //! Random mechanisms with contacts.
 
-use mbd_codegen::model::Model;
+use mbd_codegen::model::{Body, Joint, JointKind, Model, Placement, Rotation, Value};
 use mbd_codegen::read;
 
 use super::{random_model, Distribution, Rng};
@@ -59,6 +59,42 @@ pub fn with_contacts(seed: u64) -> Option<Model> {
         .ok()
         .map(|read| read.model)
         .filter(|m| !m.contacts.is_empty())
+}
+
+/// A random mechanism of three to eight bodies that hang on a floating trunk, with a foot on up to three of those on which no other
+/// hangs, which touch one floor; `None` where the description does not take it.
+pub fn with_feet(seed: u64) -> Option<Model> {
+    let distribution = Distribution {
+        bodies: (3, 8),
+        roots: 0.3,
+        branching: 0.2,
+        kinds: [6.0, 3.0, 1.0, 1.0, 2.0, 1.0, 1.0, 0.0, 0.5],
+        prescribed: 0.0,
+        params: 0.0,
+        wrenches: 0.0,
+        gravity: [1.0, 0.0, 0.0],
+        ..Distribution::everything(seed, 8)
+    };
+    let mut plain = random_model(seed, &distribution);
+    let (mut rng, trunk) = (Rng::new(seed, 74), plain.bodies.len());
+    plain.joints.iter_mut().for_each(|joint| joint.parent = joint.parent.or(Some(trunk)));
+    plain.bodies.push(Body {
+        name: "trunk".into(),
+        mass: Value::Const(2.0),
+        com: [0.02, -0.01, 0.03].map(Value::Const),
+        inertia: [0.05, 0.06, 0.07, 0.0, 0.0, 0.0].map(Value::Const),
+        inertia_axes: Rotation::NONE,
+    });
+    plain.joints.push(Joint::new("flies", JointKind::Floating, None, trunk, Placement::IDENTITY));
+    let is_tip = |body: &usize| plain.joints.iter().all(|joint| joint.parent != Some(*body));
+    let tips: Vec<usize> = (0..trunk).filter(is_tip).take(3).collect();
+    let mut text = to_toml(&plain) + "\n[[shape]]\nname = \"floor\"\ntype = \"plane\"\n";
+    for (k, tip) in tips.into_iter().enumerate() {
+        let kind = rng.below(2);
+        text += &shape(&mut rng, &format!("foot{k}"), Some(&plain.bodies[tip].name), kind);
+        text += &format!("[[contact]]\nname = \"sole{k}\"\nbetween = [\"floor\", \"foot{k}\"]\nfriction = 0.7\n");
+    }
+    read::model("feet.toml", &text, &Default::default()).ok().map(|read| read.model)
 }
 
 /// A random robot: a floating trunk with one to four legs of two to five joints, with a foot on each that touches one floor.

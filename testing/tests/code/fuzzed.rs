@@ -72,13 +72,21 @@ fn mechanism(seed: u64) -> (Plan, State) {
 /// # Panics
 /// If bits differ.
 pub fn compare(seed: u64) -> Output {
+    compare_and_count(seed).0
+}
+
+/// The same; returns also how many of the two were compared: programs may be too large for machine code.
+///
+/// # Panics
+/// If bits differ.
+pub fn compare_and_count(seed: u64) -> (Output, usize) {
     match Draw::new(seed).single {
         true => compare_in::<f32>(seed),
         false => compare_in::<f64>(seed),
     }
 }
 
-fn compare_in<S: jit::Number + Number>(seed: u64) -> Output {
+fn compare_in<S: jit::Number + Number>(seed: u64) -> (Output, usize) {
     let (plan, s) = mechanism(seed);
     let numbers = |list: &[f64]| -> Vec<S> { list.iter().map(|x| S::constant(*x)).collect() };
     let options = options::<S>(seed);
@@ -90,6 +98,7 @@ fn compare_in<S: jit::Number + Number>(seed: u64) -> Output {
     let has = |output: &Output| *output != Output::ParameterDerivatives;
     let available: Vec<Output> = Output::available(!plan.constraints.is_empty()).filter(has).collect();
     let other = available[(seed / 5) as usize % available.len()];
+    let mut count = 0;
     for output in [Output::Rates, other] {
         let given = s.inputs(&p, &a);
         let given: Vec<Vec<S>> = output.spec().inputs.iter().map(|array| numbers(given[array.name])).collect();
@@ -119,6 +128,7 @@ fn compare_in<S: jit::Number + Number>(seed: u64) -> Output {
         let [found, expected] =
             [found.concat(), expected].map(|all| all.into_iter().map(S::widened).collect::<Vec<f64>>());
         mbd_testing::assert_same_bits(&whose, output.name(), &plan.model, &found, &expected);
+        count += 1;
     }
-    other
+    (other, count)
 }

@@ -21,6 +21,7 @@ use mbd_testing::chains::general;
 use mbd_testing::closed::{random_loops, LoopKnobs};
 use mbd_testing::conformance::{chain, closed, exact, fast, sampled, tree, Case, Run};
 use mbd_testing::random::{random_model, Distribution};
+use mbd_testing::relative_error;
 use mbd_testing::state::{random_state, State};
 use mbd_testing::toml::to_toml;
 
@@ -43,10 +44,39 @@ fn runs(case: &Case) -> Vec<Run> {
     }
 }
 
-/// Every output of a case by machine code and by its program. Returns the number of outputs that are rolled.
-fn compare<S: Number>(case: &Case) -> usize {
+/// Numbers of outputs.
+#[derive(Clone, Copy, Debug, Default)]
+struct Counts {
+    compared: usize,
+    /// Those of several states at once.
+    in_lanes: usize,
+    /// Those that were not compared, because they are too large for machine code.
+    too_large: usize,
+    /// Those that are rolled, each seed counted once.
+    rolled: usize,
+}
+
+impl Counts {
+    fn add(&mut self, other: Counts) {
+        self.compared += other.compared;
+        self.in_lanes += other.in_lanes;
+        self.too_large += other.too_large;
+        self.rolled += other.rolled;
+    }
+
+    /// Asserts that so many outputs were compared, also of several states at once, and that hardly any was too large.
+    #[track_caller]
+    fn suffice(self, least: usize) {
+        println!("{self:?}");
+        assert!(self.compared >= least && self.too_large * 20 <= self.compared, "{self:?}");
+        assert!(self.in_lanes >= least / 2 || best_lanes() < 4, "{self:?}");
+    }
+}
+
+/// Every output of a case by machine code and by its program.
+fn compare<S: Number>(case: &Case) -> Counts {
     let mut machine = compiled::<S>(&case.plan, &case.options, &case.state);
-    let mut rolled = 0;
+    let mut counts = Counts::default();
     for run in runs(case) {
         let given: Vec<Vec<S>> =
             run.arrays().into_iter().map(|array| array.iter().map(|x| S::constant(*x)).collect()).collect();
@@ -56,24 +86,29 @@ fn compare<S: Number>(case: &Case) -> usize {
         let mut found: Vec<Vec<S>> = run.lengths.iter().map(|len| vec![S::constant(f64::NAN); *len]).collect();
         let mut results: Vec<&mut [S]> = found.iter_mut().map(Vec::as_mut_slice).collect();
         match machine.evaluate(run.output, &arguments, &mut results) {
-            Err(CompileError::TooLarge { .. }) => continue,
+            Err(CompileError::TooLarge { .. }) => {
+                counts.too_large += 1;
+                continue;
+            }
             result => result.unwrap_or_else(|e| panic!("{}: {:?}: {e}", case.name, run.output)),
         }
         let found: Vec<f64> = found.concat().into_iter().map(|x| x.to_f64()).collect();
         run.check(&format!("{}\n{}", case.name, to_toml(&case.plan.model)), &found);
-        rolled += usize::from(run.rolled);
+        counts.compared += 1;
+        counts.rolled += usize::from(run.rolled);
     }
-    rolled
+    counts
 }
 
 /// The same of as many states at once as a vector of some length has doubles.
-fn compare_lanes<const L: usize>(case: &Case) {
+fn compare_lanes<const L: usize>(case: &Case) -> Counts {
     let machine = compiled::<f64>(&case.plan, &case.options, &case.state);
+    let (mut counts, runs) = (Counts::default(), runs(case));
     let mut lanes = match machine.lanes::<L>() {
-        Err(CompileError::TooLarge { .. }) => return,
+        Err(CompileError::TooLarge { .. }) => return Counts { too_large: runs.len(), ..counts },
         lanes => lanes.unwrap_or_else(|e| panic!("{}: {e}", case.name)),
     };
-    for run in runs(case) {
+    for run in runs {
         let packed = |array: &[f64]| -> Vec<Packed<L>> { array.iter().map(|x| Packed::constant(*x)).collect() };
         let given: Vec<Vec<Packed<L>>> = run.arrays().into_iter().map(packed).collect();
         let arguments = given.iter().zip(&run.inputs).filter(|(_, array)| !array.field);
@@ -82,7 +117,10 @@ fn compare_lanes<const L: usize>(case: &Case) {
             run.lengths.iter().map(|len| vec![Packed::constant(f64::NAN); *len]).collect();
         let mut results: Vec<&mut [Packed<L>]> = found.iter_mut().map(Vec::as_mut_slice).collect();
         match lanes.evaluate(run.output, &arguments, &mut results) {
-            Err(CompileError::TooLarge { .. }) => continue,
+            Err(CompileError::TooLarge { .. }) => {
+                counts.too_large += 1;
+                continue;
+            }
             result => result.unwrap_or_else(|e| panic!("{}: {:?}: {e}", case.name, run.output)),
         }
         let found = found.concat();
@@ -91,64 +129,68 @@ fn compare_lanes<const L: usize>(case: &Case) {
             let whose = format!("{}, lane {lane} of {L}\n{}", case.name, to_toml(&case.plan.model));
             run.check(&whose, &found);
         }
+        counts.in_lanes += 1;
     }
+    counts
 }
 
-/// Compares the cases of some seeds. Returns the number of outputs that are rolled, each seed counted once.
-fn compare_all(case: fn(u64) -> Case, seeds: u64) -> usize {
+/// Compares the cases of some seeds.
+fn compare_all(case: fn(u64) -> Case, seeds: u64) -> Counts {
     let names: BTreeSet<String> = (0..seeds).map(|seed| case(seed).name).collect();
-    let mut all = 0;
+    let mut all = Counts::default();
     for case in sampled(case, seeds) {
-        let rolled = match case.options.precision {
+        let mut counts = match case.options.precision {
             Precision::F64 => {
                 if best_lanes() >= 4 {
-                    compare_lanes::<4>(&case);
+                    all.add(compare_lanes::<4>(&case));
                 }
                 if best_lanes() >= 8 {
-                    compare_lanes::<8>(&case);
+                    all.add(compare_lanes::<8>(&case));
                 }
                 compare::<f64>(&case)
             }
             Precision::F32 => compare::<f32>(&case),
         };
-        all += if names.contains(&case.name) { rolled } else { 0 };
+        counts.rolled *= usize::from(names.contains(&case.name));
+        all.add(counts);
     }
     all
 }
 
 #[test]
 fn trees() {
-    compare_all(tree, 24);
+    compare_all(tree, 24).suffice(450);
 }
 
 #[test]
 fn loops() {
-    compare_all(closed, 12);
+    compare_all(closed, 12).suffice(300);
 }
 
 #[test]
 fn rolled_code() {
-    let rolled = compare_all(chain, 12);
-    assert!(rolled > 60, "{rolled} outputs are rolled");
+    let counts = compare_all(chain, 12);
+    counts.suffice(240);
+    assert!(counts.rolled > 60, "{counts:?}");
 }
 
 #[test]
 fn fast_arithmetic() {
+    let mut all = Counts::default();
     for case in fast() {
         match case.options.precision {
             Precision::F64 => {
                 match best_lanes() {
                     0..4 => {}
-                    4..8 => compare_lanes::<4>(&case),
-                    8.. => compare_lanes::<8>(&case),
+                    4..8 => all.add(compare_lanes::<4>(&case)),
+                    8.. => all.add(compare_lanes::<8>(&case)),
                 }
-                compare::<f64>(&case);
+                all.add(compare::<f64>(&case));
             }
-            Precision::F32 => {
-                compare::<f32>(&case);
-            }
+            Precision::F32 => all.add(compare::<f32>(&case)),
         }
     }
+    all.suffice(75);
 }
 
 /// The environment variable that tells [`at_a_lower_level`] the level.
@@ -179,12 +221,12 @@ fn at_a_lower_level() {
     let Ok(wanted) = std::env::var(LEVEL) else { return };
     let most = if wanted == "Plain" { Level::Plain } else { Level::Fused };
     assert_eq!(kernel::limit_level(most), most);
-    compare_all(tree, 10);
-    compare_all(closed, 5);
-    compare_all(chain, 4);
-    [tree(5).fast(), chain(7).fast()].iter().for_each(|case| {
-        compare::<f64>(case);
-    });
+    compare_all(tree, 10).suffice(100);
+    compare_all(closed, 5).suffice(60);
+    compare_all(chain, 4).suffice(40);
+    for case in [tree(5).fast(), chain(7).fast()] {
+        assert!(compare::<f64>(&case).compared > 5, "{}", case.name);
+    }
     (1150..1170).for_each(|seed| {
         fuzzed::compare(seed);
     });
@@ -315,9 +357,8 @@ fn interpreted_results_of(machine: &mut Compiled, output: Output, arguments: &[&
 
 #[test]
 fn many_models() {
-    (1000..1150).for_each(|seed| {
-        fuzzed::compare(seed);
-    });
+    let compared: usize = (1000..1150).map(|seed| fuzzed::compare_and_count(seed).1).sum();
+    assert!(compared >= 290, "{compared} of 300 outputs");
 }
 
 /// The interpreter in place of machine code that is not to be had, by every output of a tree and of loops.
@@ -339,10 +380,7 @@ fn outputs_without_machine_code_are_interpreted() {
             let results = || lengths.iter().map(|len| zeros(*len)).collect::<Vec<_>>();
             let (mut by_code, mut by_interpreter, mut wrong) = (results(), results(), zeros(lengths[0] + 1));
             let mut to: Vec<&mut [f64]> = by_code.iter_mut().map(Vec::as_mut_slice).collect();
-            match c.evaluate(output, &arguments, &mut to) {
-                Err(CompileError::TooLarge { .. }) => continue,
-                done => done.expect("machine code"),
-            }
+            c.evaluate(output, &arguments, &mut to).expect("machine code");
             let mut to: Vec<&mut [f64]> = by_interpreter.iter_mut().map(Vec::as_mut_slice).collect();
             without.evaluate_or_interpret(output, &arguments, &mut to).expect("the interpreter");
             let (found, expected) = (by_interpreter.concat(), by_code.concat());
@@ -385,9 +423,8 @@ fn fast_code_is_as_accurate() {
         let (mut a, mut a2) = (zeros(s.v.len()), zeros(s.v.len()));
         c.generalized_accelerations(&s.q, &s.v, &mut a);
         i.generalized_accelerations(&s.q, &s.v, &mut a2);
-        let size = a2.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-        let off = a.iter().zip(&a2).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
-        assert!(off <= 1e-11 * size, "seed {seed}: {off:e} of {size:e}\n{}", to_toml(&model));
+        let off = relative_error(&a, &a2, 1.0);
+        assert!(off <= 1e-11, "seed {seed}: {off:e}\n{}", to_toml(&model));
     }
 }
 
@@ -421,10 +458,9 @@ fn large_angles() {
             f.generalized_accelerations(&q, &s.v, &mut a2);
             i.generalized_accelerations(&q, &s.v, &mut a3);
             mbd_testing::assert_same_bits("large angles", "accelerations", model, &a, &a3);
-            let size = a3.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-            let off = a2.iter().zip(&a3).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
             // As above; a coordinate that is a length of that size makes the inertia worse by its square.
-            assert!(off <= 1e-3 * size, "{seed}: {off:e} of {size:e}\n{}", to_toml(model));
+            let off = relative_error(&a2, &a3, 1.0);
+            assert!(off <= 1e-3, "{seed}: {off:e}\n{}", to_toml(model));
         }
     }
 }

@@ -13,9 +13,9 @@ use mbd_codegen::plan::Plan;
 use mbd_codegen::read::Base;
 use mbd_codegen::rolled::{together, Vectors};
 use mbd_codegen::{search, Arithmetic, Options, Output, Precision};
-use mbd_testing::assert_same_bits;
 use mbd_testing::branches::{tree, NUMBERS};
 use mbd_testing::state::{random_state, State};
+use mbd_testing::{assert_same_bits, relative_error};
 
 use crate::{machine_code, wide};
 
@@ -72,9 +72,8 @@ fn compare(what: &str, model: &Model, plan: &Plan, options: &Options) -> usize {
                 assert_same_bits(what, output.name(), model, &results, &expected);
             }
             // Some hundred roundings, and their growth by the condition of the inertia.
-            let size = expected.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-            let off = results.iter().zip(&expected).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
-            assert!(off <= 1e-11 * size, "{what}: {output:?} is {off:e} off, size {size:e}");
+            let off = relative_error(&results, &expected, 1.0);
+            assert!(off <= 1e-11, "{what}: {output:?} is {off:e} off");
         }
         let doubles = by_machine_code::<f64>(plan, options, &s, output, &both.inputs, &given);
         let singles = by_machine_code::<f32>(plan, options, &s, output, &both.inputs, &given);
@@ -89,10 +88,9 @@ fn compare(what: &str, model: &Model, plan: &Plan, options: &Options) -> usize {
                 assert_same_bits(what, &format!("{output:?}, machine code, f32"), model, &singles, &expected);
             }
             Arithmetic::Fast => {
-                let size = expected.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
                 for (results, error) in [(doubles, 1e-11), (singles, 1e-2)] {
-                    let off = results.iter().zip(&expected).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
-                    assert!(off <= error * size, "{what}: {output:?} by machine code is {off:e} off, size {size:e}");
+                    let off = relative_error(&results, &expected, 1.0);
+                    assert!(off <= error, "{what}: {output:?} by machine code is {off:e} off");
                 }
             }
         }

@@ -13,7 +13,7 @@ use mbd_testing::closed::{random_loops, LoopKnobs, LoopSystem};
 use mbd_testing::eliminations::random_plan_snapped;
 use mbd_testing::random::Distribution;
 use mbd_testing::state::State;
-use mbd_testing::substituted;
+use mbd_testing::{largest, relative_error, substituted};
 
 use crate::dense::case::{system, Case, Errors, SYSTEMS};
 use crate::dense::minimal::{choices, full, least, others, pivot};
@@ -132,11 +132,7 @@ fn results(plan: &Plan, s: &State, p: &[f64]) -> [Vec<f64>; 5] {
 
 /// Largest difference relative to the largest entry of both (at least 1).
 fn difference(a: &[Vec<f64>; 5], b: &[Vec<f64>; 5]) -> f64 {
-    let one = |(a, b): (&Vec<f64>, &Vec<f64>)| {
-        let size = a.iter().chain(b).fold(1.0_f64, |m, x| m.max(x.abs()));
-        a.iter().zip(b).map(|(a, b)| (a - b).abs() / size).fold(0.0, f64::max)
-    };
-    a.iter().zip(b).map(one).fold(0.0, f64::max)
+    a.iter().zip(b).map(|(a, b)| relative_error(a, b, largest(a, 1.0))).fold(0.0, f64::max)
 }
 
 /// Systems whose rows are far from dependent. Their results then differ by less than 1e-10; with four percent of a row

@@ -10,6 +10,7 @@ use mbd_runtime::{Differentiable, Dual, Interpreter, Scalar, StateDerivatives, S
 use mbd_testing::closed::{random_loops, LoopKnobs, LoopSystem};
 use mbd_testing::eliminations::random_plan;
 use mbd_testing::random::Rng;
+use mbd_testing::relative_error;
 use mbd_testing::toml::to_toml;
 
 const SYSTEMS: u64 = 400;
@@ -44,11 +45,7 @@ type Blocks = [Vec<f64>; 6];
 
 /// Largest difference of blocks, relative to the largest entry of each.
 fn difference(a: &Blocks, b: &Blocks) -> f64 {
-    let of = |(a, b): (&Vec<f64>, &Vec<f64>)| {
-        let size = b.iter().fold(1e-3_f64, |m, x| m.max(x.abs()));
-        a.iter().zip(b).fold(0.0, |worst, (a, b)| f64::max(worst, (a - b).abs() / size))
-    };
-    a.iter().zip(b).map(of).fold(0.0, f64::max)
+    a.iter().zip(b).map(|(a, b)| relative_error(a, b, 1e-3)).fold(0.0, f64::max)
 }
 
 impl Case {

@@ -3,6 +3,7 @@
 use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
 use mbd_testing::closed::{random_loops, LoopKnobs};
 use mbd_testing::eliminations::random_plan;
+use mbd_testing::largest_difference;
 
 #[test]
 fn rows_give_way_as_their_weight_says() {
@@ -45,7 +46,7 @@ fn rows_give_way_as_their_weight_says() {
             assert!(again.iter().zip(&freed).all(|(a, b)| (a - b).abs() < 1e-8 * size), "seed {seed}");
             let kinetic = 0.5 * v.iter().zip(&again).map(|(v, p)| v * p).sum::<f64>();
             assert!((soft.energies(&q, &p).0 - kinetic).abs() < 1e-8 * kinetic.abs().max(1e-3), "seed {seed}");
-            *worst = v.iter().zip(&exact).fold(0.0, |m, (a, b)| m.max((a - b).abs()));
+            *worst = largest_difference(&v, &exact);
         }
         assert!(worst[1] < 0.1 * worst[0] || worst[1] < 1e-9, "seed {seed}: {worst:?}");
     }

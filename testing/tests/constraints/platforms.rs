@@ -14,6 +14,7 @@ use mbd_runtime::sweep::FrameState;
 use mbd_runtime::tree::row_order::{early_rows, solve_late};
 use mbd_runtime::{Accelerated, Constrained};
 use mbd_testing::random::Rng;
+use mbd_testing::relative_error;
 
 /// The Stewart platform as it is shipped.
 fn text() -> String {
@@ -82,11 +83,8 @@ impl Motion {
     /// The largest difference from another motion, relative to the largest number of its kind.
     fn error(&self, other: &Motion) -> f64 {
         let lists = |m: &Motion| [&m.rates, &m.velocities, &m.accelerations, &m.forces].map(Clone::clone);
-        lists(self).iter().zip(&lists(other)).fold(0.0, |worst, (a, b)| {
-            let size = b.iter().fold(0.0_f64, |most, x| x.abs().max(most));
-            let off = a.iter().zip(b).fold(0.0_f64, |most, (x, y)| (x - y).abs().max(most));
-            worst.max(off / size)
-        })
+        let each = lists(self).into_iter().zip(lists(other)).map(|(a, b)| relative_error(&a, &b, 0.0));
+        each.fold(0.0, f64::max)
     }
 }
 

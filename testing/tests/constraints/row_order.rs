@@ -13,6 +13,7 @@ use mbd_runtime::constrained::{Effort, Projection, Stabilisation, WithPostStep};
 use mbd_runtime::integrate::{Rk4, Stepper};
 use mbd_runtime::system::Real;
 use mbd_runtime::{Accelerated, Constrained, Interpreter, Scalar, System};
+use mbd_testing::relative_error;
 
 /// A chain of four bodies on revolute joints about changing axes, and couplings with given rows.
 fn text(rows: &[[f64; 4]]) -> String {
@@ -88,19 +89,13 @@ where
 {
     let read = read::model("coupled.toml", &text(rows), &ImportOptions::default());
     let plan = plan(&read.unwrap_or_else(|e| panic!("{e}")).model);
-    let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| x.abs().max(m));
     let (mut errors, mut three) = (Vec::new(), true);
     for state in 0..STATES {
         let (found, rank) = motion::<Y>(&plan, state, anew);
         // In the same order: the row `a + δ u` is rounded, and `u` follows from it and `a` to `ε/δ` only.
         let (exact, _) = motion::<Interpreter<Wide>>(&plan, state, anew);
         three &= rank == 3;
-        let mut worst = 0.0_f64;
-        for (found, exact) in found.iter().zip(&exact) {
-            let off: Vec<f64> = found.iter().zip(exact).map(|(a, b)| a - b).collect();
-            worst = worst.max(largest(&off) / largest(exact));
-        }
-        errors.push(worst);
+        errors.push(found.iter().zip(&exact).map(|(a, b)| relative_error(a, b, 0.0)).fold(0.0, f64::max));
     }
     errors.sort_by(f64::total_cmp);
     (errors[STATES / 2], three)
@@ -134,6 +129,18 @@ fn extremes(errors: &[f64]) -> [f64; 2] {
     [f64::min, f64::max].map(|of| errors.iter().copied().reduce(of).expect("orders"))
 }
 
+/// Asserts that errors are small, and no order is worse than another.
+///
+/// References have the rows that were rounded, so that `1/δ` is in no error where the rows are well ordered: there were at
+/// most 225 ε for every δ from 1e-1 to 1e-7, after some hundred operations. A bad order errs by a hundred thousand ε
+/// where δ is 1e-2.
+fn are_alike(errors: &[f64], delta: f64) {
+    let [best, worst] = extremes(errors);
+    println!("δ = {delta:e}: errors between {best:.1e} and {worst:.1e}, {:.0} ε", worst / f64::EPSILON);
+    assert!(worst <= 10.0 * best, "{delta:e}: {errors:?}");
+    assert!(worst < 2000.0 * f64::EPSILON, "{delta:e}: {worst:e}");
+}
+
 fn any_order(plan: impl Fn(&Model) -> Plan + Copy, deltas: &[f64]) {
     // In the second set `u` binds the outer joints alone, in the third it binds the inner ones.
     for u in [U, [0.0, 0.0, -1.0, 0.7], [0.6, -1.0, 0.0, 0.0]] {
@@ -141,9 +148,8 @@ fn any_order(plan: impl Fn(&Model) -> Plan + Copy, deltas: &[f64]) {
             let rows = rows(A, u, W, delta);
             let (errors, three) = errors::<Interpreter<f64>>(&rows, |model, _| plan(model), false);
             assert!(three, "{u:?}, {delta:e}");
-            let [best, worst] = extremes(&errors);
-            println!("u = {u:?}, δ = {delta:e}: errors between {best:.1e} and {worst:.1e}");
-            assert!(worst <= 10.0 * best, "{u:?}, {delta:e}: {errors:?}");
+            println!("u = {u:?}");
+            are_alike(&errors, delta);
         }
     }
 }
@@ -212,9 +218,8 @@ fn rows_that_become_nearly_dependent_later_lose_a_bounded_number_of_digits_in_a_
 fn and_none_where_they_are_ordered_anew() {
     for delta in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7] {
         let (errors, three) = later::<Interpreter<f64>>(delta, true);
-        let [best, worst] = extremes(&errors);
-        println!("δ = {delta:e}, ordered anew: errors between {best:.1e} and {worst:.1e}");
-        assert!(three && worst <= 10.0 * best, "{delta:e}: {errors:?}");
+        assert!(three, "{delta:e}");
+        are_alike(&errors, delta);
     }
     let (errors, three) = later::<Compiled>(1e-4, true);
     assert!(three);
@@ -233,9 +238,8 @@ fn rows_in_passes_may_come_in_any_order() {
     for delta in [1e-1, 3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7] {
         let rows = rows(A, U, W, FAR);
         let (errors, three) = errors::<Interpreter<f64>>(&rows, |model, listed| passes(model, listed, delta), false);
-        let [best, worst] = extremes(&errors);
-        println!("δ = {delta:e}, in passes: errors between {best:.1e} and {worst:.1e}");
-        assert!(three && worst <= 10.0 * best, "{delta:e}: {errors:?}");
+        assert!(three, "{delta:e}");
+        are_alike(&errors, delta);
     }
 }
 

@@ -12,6 +12,7 @@ use mbd_codegen::{Arithmetic, Options};
 use mbd_runtime::constrained::{Effort, PostStep, Projection, Stabilisation, WithPostStep};
 use mbd_runtime::integrate::{Rk4, Stepper};
 use mbd_runtime::{Accelerated, Conjugate, Constrained, Interpreter, Real, Scalar, System};
+use mbd_testing::relative_error;
 
 /// Angles of the slots, rad.
 const SLOTS: [f64; 3] = [0.0, 0.7, 1.4];
@@ -71,9 +72,8 @@ where
         let wide = |x: &[f64]| x.iter().map(|x| Wide::constant(*x)).collect::<Vec<_>>();
         let mut right = exact.zero_momenta();
         exact.generalized_accelerations(&wide(&q), &wide(&v), &mut right);
-        let largest = right.iter().fold(0.0_f64, |most, a| most.max(a.to_f64().abs()));
-        let off = a.iter().zip(&right).fold(0.0_f64, |most, (a, right)| most.max((a - right.to_f64()).abs()));
-        worst = worst.max(off / largest);
+        let right: Vec<f64> = right.iter().map(|a| a.to_f64()).collect();
+        worst = worst.max(relative_error(&a, &right, 0.0));
     }
     worst
 }

@@ -391,7 +391,7 @@ fn what_is_thrown_on_a_box_gains_no_energy() {
 
 /// A hundred of each, which take minutes, or as many as `MBD_DROPS` says.
 #[test]
-#[ignore]
+#[ignore = "a hundred of each take minutes"]
 fn many_that_are_thrown_on_a_box_gain_no_energy() {
     let count = std::env::var("MBD_DROPS").map_or(100, |count| count.parse().unwrap());
     assert_eq!([rod(), block(), pebble(8, 0.01)].map(|solid| thrown(CRATE, &solid, count)), [0; 3]);

@@ -273,7 +273,7 @@ fn what_is_thrown_on_a_cylinder_gains_no_energy() {
 
 /// A hundred of each, which take minutes, or as many as `MBD_DROPS` says.
 #[test]
-#[ignore]
+#[ignore = "a hundred of each take minutes"]
 fn many_that_are_thrown_on_a_cylinder_gain_no_energy() {
     let count = std::env::var("MBD_DROPS").map_or(100, |count| count.parse().unwrap());
     let drum = Drum { radius: 0.25, length: 0.4, sides: 8, rounding: 0.0 };

@@ -123,7 +123,7 @@ fn thrown(text: &str, seed: u64) -> Scene {
 /// A hundred of them, or as many as `MBD_DROPS` says; the numbers of those that are not followed to their end within 20,000 steps,
 /// and of those that end with another error.
 #[test]
-#[ignore]
+#[ignore = "a hundred of each take minutes"]
 fn many_thrown_quadrupeds_land() {
     let count = std::env::var("MBD_DROPS").map_or(100, |count| count.parse().unwrap());
     for (name, text, time) in [

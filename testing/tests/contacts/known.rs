@@ -235,7 +235,7 @@ fn boxes_that_are_thrown_end_on_the_floor() {
 
 /// A hundred of them, which take a minute, or as many as `MBD_DROPS` says.
 #[test]
-#[ignore]
+#[ignore = "a hundred take a minute"]
 fn many_boxes_that_are_thrown_end_on_the_floor() {
     let count = std::env::var("MBD_DROPS").map_or(100, |count| count.parse().unwrap());
     let failed = drops(count);

@@ -9,15 +9,11 @@ use mbd_runtime::contact::{
 };
 use mbd_runtime::integrate::{Dop853, Step, Tolerances};
 use mbd_runtime::{Conjugate, Constrained, Energetic};
+pub use mbd_testing::largest_difference as apart;
 
 pub type Mechanism = ContactInterpreter<f64>;
 type Closed = Projection<WithContacts<Mechanism>>;
 type Method = WithPostStep<WithContacts<Mechanism>, Dop853<WithContacts<Mechanism>>, Closed>;
-
-/// Largest difference between entries of two lists.
-pub fn apart(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-}
 
 /// A motion with contacts, and its events.
 pub struct Scene {

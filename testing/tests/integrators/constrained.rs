@@ -12,6 +12,7 @@ use mbd_runtime::constrained::{
 use mbd_runtime::integrate::{Dop853, Radau5, Rk4, Solver, Step, Stepper, Tolerances};
 use mbd_runtime::system::Real;
 use mbd_runtime::{Conjugate, Constrained, Energetic, Interpreter, System};
+use mbd_testing::largest_difference as apart;
 
 type Mechanism = Interpreter<f64>;
 type State = (Vec<f64>, Vec<f64>);
@@ -211,10 +212,6 @@ fn held<Y: Constrained<Scalar = f64>, M: Stepper<Y>>(
 fn unjudged<Y: Constrained<Scalar = f64>>(y: &Y, policy: Stabilisation) -> WithPostStep<Y, Rk4<Y>, Projection<Y>> {
     let effort = Effort { energy: f64::INFINITY, ..Effort::default() };
     WithPostStep::new(y, Rk4::new(y), Projection::new(y, policy, effort))
-}
-
-fn apart(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
 }
 
 /// All ways to integrate with constraints converge to the same state with their orders. The mechanisms are a planar

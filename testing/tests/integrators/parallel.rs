@@ -2,12 +2,9 @@
 
 use mbd_runtime::integrate::{Gauss16, Point, Solver, Step, Stepper, Tolerances, Verner9};
 use mbd_runtime::{Interpreter, System};
+use mbd_testing::largest_difference;
 
 use crate::orders::{scenes, Scene};
-
-fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |most, (a, b)| (a - b).abs().max(most))
-}
 
 /// Within a step it gives what a shorter step gives, which starts from other stages: to what the iterations leave.
 #[test]

@@ -5,6 +5,7 @@ use mbd_runtime::integrate::{
     Gauss12FixedPoint, Gauss4, Gauss6, Gauss6FixedPoint, ImplicitMidpoint, StepError, Stepper,
 };
 use mbd_runtime::{Interpreter, System};
+use mbd_testing::largest_difference as apart;
 use mbd_testing::motions::MOTIONS;
 
 use crate::orders::{scenes, Scene};
@@ -26,10 +27,6 @@ fn scene() -> Scene {
     let [_, _, scene] = scenes();
     assert!(scene.i.quaternions().count() > 1);
     scene
-}
-
-fn apart(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
 }
 
 /// Ten steps forward and ten back. Every step solves its equations to round-off and rounds its sums, and an error grows

@@ -13,7 +13,7 @@ use mbd_testing::newton::joint_rates;
 use mbd_testing::random::{random_model, Distribution, Rng};
 use mbd_testing::state::{random_state, State};
 use mbd_testing::toml::to_toml;
-use mbd_testing::{substituted, value};
+use mbd_testing::{largest, relative_error, substituted, value};
 
 const TREES: u64 = 300;
 
@@ -58,10 +58,7 @@ fn results(plan: &Plan, s: &State) -> Results {
 
 /// Largest difference relative to the largest entry (at least 1).
 fn difference(a: &[f64], b: &[f64]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    let size = a.iter().chain(b).fold(1.0_f64, |m, x| m.max(x.abs()));
-    let worst = a.iter().zip(b).map(|(a, b)| (a - b).abs() / size);
-    worst.fold(0.0, |m, x| if x.is_finite() { m.max(x) } else { f64::INFINITY })
+    relative_error(a, b, largest(a, 1.0))
 }
 
 fn compare(seed: u64, model: &Model, a: &Results, b: &Results, tolerance: f64) -> f64 {

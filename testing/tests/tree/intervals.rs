@@ -78,7 +78,7 @@ fn single_states() {
 
 #[test]
 fn boxes_of_states() {
-    let mut excess = Vec::new();
+    let (mut excess, mut bounded, mut all) = (Vec::new(), [0; 2], 0);
     for seed in 0..SOME {
         let Case { plan, s, .. } = Case::new(seed);
         let mut rng = Rng::new(seed, 77);
@@ -129,6 +129,9 @@ fn boxes_of_states() {
                 span[i] = [span[i][0].min(x), span[i][1].max(x)];
             }
         }
+        all += span.len();
+        bounded[0] += naive.iter().filter(|x| x.is_bounded()).count();
+        bounded[1] += mean.iter().filter(|x| x.is_bounded()).count();
         for (i, [low, high]) in span.into_iter().enumerate() {
             if mean[i].is_bounded() && high - low > 1e-9 {
                 excess.push(mean[i].width() / (high - low));
@@ -137,6 +140,10 @@ fn boxes_of_states() {
     }
     excess.sort_by(f64::total_cmp);
     let (median, most) = (excess[excess.len() / 2], excess[excess.len() * 9 / 10]);
+    println!("of {all}, {} bounded plainly and {} by the mean value form", bounded[0], bounded[1]);
+    // 83 %: in ten of these boxes the inertia of an ill-conditioned tree may be singular, which leaves rates and
+    // accelerations without bounds.
+    assert!(bounded.iter().all(|bounded| bounded * 4 > all * 3), "{bounded:?} of {all}");
     println!("width of the mean value form over that of the samples: median {median:.2}, 90 % below {most:.2}");
     // Measured 1.23 and 12.8. A linear function has its range at two corners of the box, which random ones need not reach;
     // the rest of the excess grows with the condition of the tree.

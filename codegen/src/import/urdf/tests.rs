@@ -1,6 +1,6 @@
 use crate::diag::{Diagnostics, Severity};
 use crate::import::{Base, Floor, ImportOptions};
-use crate::model::{Gravity, JointKind, JointMotion, Model, Rotation, ShapeKind, Value};
+use crate::model::{Gravity, JointBounds, JointKind, JointMotion, Model, Rotation, ShapeKind, Value};
 use crate::read::load;
 use std::fmt::Write;
 
@@ -215,6 +215,58 @@ fn no_bytes_make_it_panic() {
     write!(long, "{0}='1' value{1}={1}'ä'/></inertial></link></robot>", "ä".repeat(40_000), " ".repeat(300)).unwrap();
     let (m, findings) = import(&long, Base::Floating);
     assert!(m.is_none() && findings.0.len() >= 3, "{findings}");
+}
+
+/// What `limit` says of the motion that a joint is made for: files state zeros, huge numbers and one end for what they do not
+/// know.
+#[test]
+fn limits_bound_motion_where_they_say_something() {
+    let range = |lower: f64, upper: f64| Some([lower, upper]);
+    let mimic = "<mimic joint='leader'/>";
+    for (kind, more, limit, range, velocity, effort) in [
+        ("revolute", "", "lower='-1' upper='2' velocity='3' effort='4'", range(-1.0, 2.0), Some(3.0), Some(4.0)),
+        (
+            "prismatic",
+            "",
+            " lower=' -0.5 ' upper='1e-1' velocity='1e29' effort='1e-3'",
+            range(-0.5, 0.1),
+            Some(1e29),
+            Some(1e-3),
+        ),
+        // Zeros, and what is less, are no bounds of speeds and efforts.
+        ("revolute", "", "lower='0' upper='0' velocity='0' effort='0'", None, None, None),
+        ("revolute", "", "lower='-1' upper='1' velocity='-3' effort='0.0'", range(-1.0, 1.0), None, None),
+        // One end that is not stated is zero.
+        ("revolute", "", "upper='2'", range(0.0, 2.0), None, None),
+        ("revolute", "", "lower='-2' effort='5'", range(-2.0, 0.0), None, Some(5.0)),
+        ("revolute", "", "lower='2'", None, None, None),
+        ("revolute", "", "upper='-2'", None, None, None),
+        ("revolute", "", "velocity='1'", None, Some(1.0), None),
+        ("revolute", "", "", None, None, None),
+        // Ends in the wrong order, or equal ones.
+        ("revolute", "", "lower='2' upper='-1' velocity='3'", None, Some(3.0), None),
+        ("revolute", "", "lower='1' upper='1' effort='3'", None, None, Some(3.0)),
+        // Numbers that are meant as none, and what is no number.
+        ("revolute", "", "lower='-1e30' upper='1e30' velocity='1e30' effort='1e31'", None, None, None),
+        ("revolute", "", "lower='-1' upper='1e30' velocity='2'", None, Some(2.0), None),
+        ("revolute", "", "lower='-9.9e29' upper='9.9e29'", range(-9.9e29, 9.9e29), None, None),
+        ("revolute", "", "lower='-inf' upper='inf' velocity='inf' effort='inf'", None, None, None),
+        ("revolute", "", "lower='-1' upper='nan' velocity='nan' effort='nan'", None, None, None),
+        ("revolute", "", "lower='-1' upper='far' velocity='fast' effort=''", None, None, None),
+        // A joint that follows another has no range of its own, and one that turns freely has none.
+        ("revolute", mimic, "lower='-1' upper='2' velocity='3' effort='4'", None, Some(3.0), Some(4.0)),
+        ("continuous", "", "lower='-1' upper='2' velocity='3' effort='4'", None, Some(3.0), Some(4.0)),
+        // Of several freedoms each has these bounds of speed and effort; of none, none.
+        ("spherical", "", "lower='-1' upper='2' velocity='3' effort='4'", None, Some(3.0), Some(4.0)),
+        ("fixed", "", "lower='-1' upper='2' velocity='3' effort='4'", None, None, None),
+    ] {
+        let links = ["base", "one", "two"].map(link).concat();
+        let leader = joint("leader", "revolute", "base", "one", "");
+        let bounded = joint("bounded", kind, "base", "two", &format!("{more}<limit {limit}/>"));
+        let (m, _) = model(&format!("<robot name='r'>{links}{leader}{bounded}</robot>"), Base::Fixed);
+        let bounded = m.joints.iter().find(|joint| joint.name == "bounded").expect("the joint");
+        assert_eq!(bounded.bounds, JointBounds { range, velocity, effort }, "{kind} {more} {limit}");
+    }
 }
 
 /// A robot with every kind of shape, a joint with limits, and one that follows it.
