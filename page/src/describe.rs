@@ -1,7 +1,7 @@
 //! What the page has to know of a mechanism, as JSON.
 
 use multibody::codegen::diag::{Diagnostics, Severity};
-use multibody::codegen::model::{ShapeKind, Value};
+use multibody::codegen::model::{ShapeKind, Unit, Value};
 use multibody::runtime::constrained::{close, Closing};
 use multibody::runtime::tree::Source;
 use multibody::runtime::{Constrained, System as _};
@@ -31,21 +31,23 @@ pub fn findings(findings: &Diagnostics) -> String {
     }))
 }
 
-/// Unit, bounds and whether it is a plain number that a slider can set, for each coordinate.
+/// Unit, bounds, whether it is a plain number that a slider can set, and the velocity that is its rate, for each coordinate.
+/// Translations of planar and floating joints have none: their velocities are in body axes.
 fn coordinates(scene: &Scene) -> String {
     let plan = &scene.plan;
-    let mut places = vec![(String::new(), [None; 2], false); plan.dims.nq];
+    let mut places = vec![(String::new(), [None; 2], false, None); plan.dims.nq];
     for slot in &plan.slots {
-        let Some(Source::State { q, .. }) = slot.at else { continue };
+        let Some(Source::State { q, v }) = slot.at else { continue };
         let joint = &plan.model.joints[slot.joint];
         let spec = joint.kind.spec();
         for (k, coordinate) in spec.coordinates.iter().enumerate() {
             let range = joint.bounds.range.map_or([None; 2], |range| range.map(Some));
-            places[q + k] = (coordinate.unit.symbol().into(), range, !coordinate.unit.symbol().is_empty());
+            let rate = (spec.group.is_none() || coordinate.unit == Unit::Radian).then_some(v + k);
+            places[q + k] = (coordinate.unit.symbol().into(), range, coordinate.unit != Unit::One, rate);
         }
     }
     let names = plan.coordinate_names();
-    list(names.iter().zip(places).map(|(name, (unit, range, plain))| {
+    list(names.iter().zip(places).map(|(name, (unit, range, plain, rate))| {
         let bound = |x: Option<f64>| x.map_or("null".into(), number);
         object(&[
             ("name", text(name)),
@@ -53,6 +55,7 @@ fn coordinates(scene: &Scene) -> String {
             ("low", bound(range[0])),
             ("high", bound(range[1])),
             ("plain", plain.to_string()),
+            ("v", rate.map_or("null".into(), |v: usize| v.to_string())),
         ])
     }))
 }

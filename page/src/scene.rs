@@ -47,8 +47,8 @@ pub struct Scene {
     view: Interpreter<f64>,
     frames: Vec<FrameState<f64>>,
     touch: Option<Touch>,
-    /// The coordinate and the value whose crossings upwards are kept, for sections of Poincaré.
-    section: Option<(usize, f64)>,
+    /// The coordinate and the value whose crossings upwards are kept, for sections of Poincaré, and whether it is an angle.
+    section: Option<(usize, f64, bool)>,
     /// States at crossings since the last look.
     crossings: Vec<Vec<f64>>,
     /// What the page reads.
@@ -92,6 +92,13 @@ fn viewer(plan: &Plan) -> Interpreter<f64> {
     interpreter
 }
 
+/// Damping of every velocity, N m s/rad or N s/m.
+fn damping(view: &Interpreter<f64>, nv: usize) -> Vec<f64> {
+    let all = view.tree().dynamic_parameters();
+    let end = all.len();
+    all[end - 2 * nv..end - nv].to_vec()
+}
+
 impl Scene {
     /// Makes a scene of a model, at its start, with loops closed.
     ///
@@ -101,10 +108,9 @@ impl Scene {
         // No search: the code is assembled within a second, and its bits do not depend on how long a search may take.
         let plan = search::plan(model, PlanOptions::quick());
         let mut view = viewer(&plan);
-        let damping = view.tree().dynamic_parameters();
-        let (end, nv) = (damping.len(), plan.dims.nv);
-        let damping = damping[end - 2 * nv..end - nv].to_vec();
-        let load = Rc::new(RefCell::new(Load { efforts: vec![0.0; nv], damping, pull: None }));
+        let nv = plan.dims.nv;
+        let load = Load { efforts: vec![0.0; nv], damping: damping(&view, nv), pull: None };
+        let load = Rc::new(RefCell::new(load));
         let (mut q, v) = (default_start(&plan), default_velocity(&plan));
         view.check_rank(&q).map_err(|e| format!("{e}: give the bodies behind this joint mass and inertia"))?;
         if !view.rows().is_empty() {
@@ -226,6 +232,7 @@ impl Scene {
             self.start.1 = consistent(&self.plan, &mut view, &start, self.start.1.clone());
         }
         self.start.0 = start;
+        self.load.borrow_mut().damping = damping(&view, v.len());
         self.view = view;
         self.system = system(&self.plan, &self.load);
         self.touch = Touch::new(&self.plan);

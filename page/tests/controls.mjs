@@ -217,6 +217,102 @@ async function motion() {
   await page.end("motion");
 }
 
+/** The text of a model of one body on a joint, with weight along x. */
+const one = (joint, params = "") => `name = "one"
+gravity = [9.81, 0, 0]
+${params}
+[[body]]
+name = "body"
+mass = 1
+com = [0, 0, -0.5]
+inertia = [0.1, 0.1, 0.1]
+[[joint]]
+name = "it"
+child = "body"
+${joint}
+`;
+
+/** Changes: those that are refused, those from what was shown before; coordinates in metres, momenta, dampers. */
+async function changes() {
+  const page = await opened(null);
+  /** Waits until all questions are answered. */
+  const idle = () => page.evaluate("(async () => { for (let last = null; last !== queue || pending.size; ) { last = queue; await queue; await new Promise((resolve) => setTimeout(resolve, 20)); } })()");
+  const bar = await page.evaluate("$('bar').hidden");
+  const fourbar = text("models/mechanisms/fourbar.toml").toString().replace("gravity =", "params = { far = 0.4 }\ngravity =").replace("xyz = [0.4,", 'xyz = [{ param = "far" },');
+  await page.drop(["fourbar.toml", fourbar]);
+  await page.unfold();
+  await page.run(0.3);
+  // A start and a parameter with which the loop does not close.
+  const parameter = "[data-part=Parameters] input", shown = "[page.instant.t, page.history.length, page.shown]";
+  const before = await page.of(shown);
+  await page.set("[data-q='2']", "0");
+  await idle();
+  const refused = await page.of("[$('trouble').hidden, $('trouble-head').textContent, $('trouble-text').textContent]");
+  claim(!refused[0] && /do not close/.test(refused[2]) && (await page.of(shown)).join() === before.join(), `what is refused is told, and keeps what was shown: ${refused[1]}: ${refused[2]}`);
+  await page.set("[data-part=Efforts] input", "0.2");
+  await idle();
+  claim(await page.evaluate("$('trouble').hidden"), "the message goes with the next change");
+  await page.set(parameter, "1.2");
+  await idle();
+  claim(await page.evaluate(`!$('trouble').hidden && Math.abs(document.querySelector(${JSON.stringify(parameter)}).value - 0.4) < 1e-12`), "a refused parameter gets its value back");
+  await page.click("#dismiss");
+  claim(await page.evaluate("$('trouble').hidden && Math.abs(document.querySelector('[data-part=Efforts] input').value - 0.2) < 1e-12"), "sliders keep their values when a message is closed");
+  // From what was shown before.
+  for (const [name, change] of [["an effort", () => page.set("[data-part=Efforts] input", "0.1")], ["a parameter", () => page.set(parameter, "0.4001")], ["a step", () => page.set("[data-part=Method] label:nth-of-type(2) select", "0.002", "change")]]) {
+    await page.run((await page.evaluate("page.instant.t")) + 0.2);
+    await page.set("#scrub", "0.5");
+    const [t, at] = await page.of("[page.instant.t, page.shown]");
+    await change();
+    await idle();
+    const [now, q, length] = await page.of("[page.instant.t, page.history.at(-2).q(0) - page.instant.q(0), page.history.length]");
+    claim(now === t && Math.abs(q) < 1e-2 && length === at + 2, `${name} is changed from what is shown on`);
+  }
+  claim(await page.evaluate("page.measured.steps === 0 && page.settings.step === 0.002"), "times of a step are measured anew with another step");
+  await page.run((await page.evaluate("page.instant.t")) + 0.2);
+  await page.set("#scrub", "0.5");
+  const scrubbed = await page.of(shown);
+  await page.evaluate("document.querySelector('[data-part=Phase] input').click()");
+  await idle();
+  claim((await page.of(shown)).join() === scrubbed.join(), "a section alone changes nothing that is shown");
+  await page.evaluate("document.querySelector('[data-part=Phase] input').click()");
+  await page.evaluate("(() => { grasp({ frame: page.scene.bodies[1].frame, point: page.instant.place(page.scene.bodies[1].frame, page.scene.bodies[1].com) }); letGo(); })()");
+  await idle();
+  await page.evaluate("steps(1)");
+  claim(await page.evaluate("!page.hold && page.instant.hand() === null"), "a tap on a body while scrubbed holds nothing");
+  claim(await page.evaluate("page.history.at(-1).most[1] >= Math.max(...page.history.map((i) => Math.abs(i.error))) && page.history.at(-1).most[0] >= Math.max(...page.history.map((i) => i.kinetic))"), "the largest error is that of all instants");
+  // The engine stops.
+  await page.evaluate("stopped(new Error('a test'))");
+  const stays = await page.of("!$('bar').hidden && !$('restart').disabled");
+  await page.click("#restart");
+  await page.until("page.scene && $('trouble').hidden");
+  claim(bar && stays, "a motion that stopped can be opened again");
+  // Metres: 2π of them are no turn.
+  await page.drop(["one.toml", one('type = "prismatic"\naxis = [1, 0, 0]\nstart = 1')]);
+  await page.evaluate("(() => { page.look.section = true; renewed(); })()");
+  await page.unfold();
+  await page.run(1.2);
+  const metres = await page.of("[page.instant.q(0), page.sections.length]");
+  await page.state("metres");
+  claim(metres[0] > 7 && metres[1] === 0 && (await page.evaluate("document.querySelector('[data-q=\"0\"]').nextSibling.textContent === `${digits(page.instant.q(0))} m`")), `${metres[0].toFixed(2)} m are shown as they are, and cross no section`);
+  await page.evaluate("page.look.section = false");
+  // Momenta of their own.
+  await page.drop(["chain.toml", text("models/variants/chain.toml")]);
+  claim((await page.of("page.scene.coordinates.map((c) => c.v)")).join() === "0,,,,,4,5,6" && (await page.of("[...document.querySelectorAll('[data-part=Phase] select')].map((list) => list.options.length)")).join() === "4,4", "a coordinate behind a ball has its own momentum");
+  await page.drop(["one.toml", one('type = "floating"')]);
+  claim(await page.evaluate("page.scene.coordinates.every((c) => c.v === null) && document.querySelectorAll('[data-part=Phase] select').length === 0"), "momenta in body axes belong to no coordinate");
+  await page.drop(["one.toml", one('type = "planar"')]);
+  claim((await page.of("page.scene.coordinates.map((c) => c.v)")).join() === ",,2", "of a planar joint, the angle has a momentum");
+  // A damper that a slider sets.
+  await page.drop(["one.toml", one('type = "revolute"\naxis = [0, 1, 0]\ndamping = { param = "c" }', "params = { c = 0 }")]);
+  await page.unfold();
+  await page.set(parameter, "0.5");
+  await idle();
+  await page.run(1);
+  const damped = await page.of("[page.instant.work, ...page.history.at(-1).most]");
+  claim(damped[0] < -1e-3 && damped[2] < 1e-4 * damped[1], `a damper takes ${(-damped[0]).toFixed(3)} J, and the energy balances to ${(damped[2] / damped[1]).toExponential(1)} of the largest kinetic energy`);
+  await page.end("changes");
+}
+
 async function loopsAndContacts() {
   let page = await opened("models/mechanisms/stewart.toml");
   await page.unfold();
@@ -280,7 +376,7 @@ async function looks() {
 }
 
 try {
-  for (const part of [files, motion, loopsAndContacts, looks]) await part();
+  for (const part of [files, motion, changes, loopsAndContacts, looks]) await part();
 } finally {
   await browser.close();
   rmSync(folder, { recursive: true, force: true });

@@ -67,6 +67,12 @@ function trouble(head, text) {
   if (text) say(`${head}. ${text.split("\n")[0]}`);
 }
 
+/** What is measured of the motion begins anew. */
+function unmeasured() {
+  Object.assign(page.measured, { steps: 0, spent: 0 });
+  page.slow = 0;
+}
+
 /** Opens the first description among some files, `[name, ArrayBuffer]` each; the others are what it may name. */
 async function open(files, options = {}) {
   const described = files.filter(([name]) => /\.(toml|urdf|xml|mjcf)$/i.test(name));
@@ -105,6 +111,7 @@ async function open(files, options = {}) {
   scene.meshes = answer.meshes;
   scene.at = layout(scene);
   page.history = [];
+  unmeasured();
   page.efforts = scene.velocities.map(() => 0);
   page.hold = null;
   // What nothing holds falls out of sight.
@@ -167,6 +174,9 @@ function aim() {
 function show(instant, isNew) {
   page.instant = instant;
   if (isNew) {
+    // Largest kinetic energy and largest error so far, also of instants that are not kept.
+    const before = page.history.at(-1)?.most ?? [0, 0];
+    instant.most = [instant.kinetic, instant.error].map((x, k) => Math.max(before[k], Math.abs(x)));
     page.history.push(instant);
     if (page.look.section) page.sections.push(...instant.crossings());
     const most = Math.max(600, Math.min(KEPT, Math.floor(KEPT_NUMBERS / instant.numbers.length)));
@@ -186,7 +196,10 @@ function answered({ numbers, seen = [] }, fresh = false) {
 /** Whether forces are shown. */
 const wanted = () => page.look.forces || page.look.reactions;
 
-/** Asks for something that changes the motion, one question after the other. */
+/** Head of the message about a change that was refused. */
+const REFUSED = "The change was refused";
+
+/** Asks for something that changes the motion, one question after the other. What is refused changes nothing. */
 let queue = Promise.resolve();
 function change(question, fresh = false) {
   const scene = page.scene;
@@ -194,8 +207,11 @@ function change(question, fresh = false) {
     if (!page.scene || scene !== page.scene) return null;
     try {
       const answer = await engine.ask({ forces: wanted(), ...question });
-      if (answer.ok === false) say(answer.text);
-      answered(answer, fresh);
+      if (answer.ok === false) trouble(REFUSED, answer.text);
+      else {
+        if (answer.ok && $("trouble-head").textContent === REFUSED) trouble("", "");
+        answered(answer, fresh);
+      }
       return answer;
     } catch (error) {
       stopped(error);
@@ -217,9 +233,13 @@ function stopped(error) {
 async function rejoin() {
   if (!page.scene || page.shown === page.history.length - 1) return;
   page.history.length = page.shown + 1;
-  const { t } = page.instant;
-  page.history.pop();
-  await change({ action: "state", t, values: [...page.instant.state()] });
+  await change({ action: "state", t: page.instant.t, values: [...page.instant.state()] });
+}
+
+/** A change of the motion from what is shown on. */
+async function changeShown(question) {
+  await rejoin();
+  return change(question);
 }
 
 async function play(on = !page.playing) {
@@ -248,9 +268,8 @@ async function restart() {
 async function steps(count) {
   page.playing = false;
   paused();
-  await rejoin();
   page.busy = true;
-  const answer = await change({ action: "frame", steps: count, most: 1000 });
+  const answer = await changeShown({ action: "frame", steps: count, most: 1000 });
   page.busy = false;
   if (answer?.trouble) ended(answer.trouble);
 }

@@ -31,6 +31,7 @@ async function grasp({ frame, point }) {
   page.hold = { frame, hand: point, depth: -dot(sub(point, canvas.eye), canvas.towards) };
   const hold = page.hold;
   await rejoin();
+  if (page.hold !== hold) return;
   await change({ action: "change", call: "pull", args: [frame, ...at, stiffness, damping] });
   if (page.hold !== hold) return;
   canvas.element.style.cursor = "grabbing";
@@ -115,6 +116,32 @@ const KEYS = {
   ArrowLeft: () => turn(-0.08, 0), ArrowRight: () => turn(0.08, 0), ArrowUp: () => turn(0, 0.06), ArrowDown: () => turn(0, -0.06),
 };
 
+/** What is there without a mechanism. */
+const EMPTY = `<h2>Drop a mechanism here</h2>
+<p>A model of this project (<code>.toml</code>), a robot (<code>.urdf</code>) or a model of MuJoCo (<code>.xml</code>), with its meshes (<code>.stl</code>, <code>.obj</code>) and included files, if it has any.</p>
+<p><button id="choose" type="button">Choose files</button></p>
+<p class="muted">Files stay on this machine: the page makes no request.</p>`;
+
+/** Speeds of the motion, as they are called. */
+const SPEEDS = [["1/20", 0.05], ["1/10", 0.1], ["1/4", 0.25], ["1/2", 0.5], [1, 1], [2, 2], [4, 4]];
+
+/** What keys and mouse do: the list of `?`. */
+const HELP = [
+  ["drag the background", "look around; with shift or two fingers, move the view"],
+  ["drag a body", "pull it with a spring"],
+  ["wheel, + and −", "distance"],
+  ["arrows", "look around"],
+  ["space", "play or pause"],
+  ["R", "back to the start"],
+  [".", "one step"],
+  ["[ and ]", "earlier and later in what was shown"],
+  ["F", "follow the mechanism"],
+  ["N", "names"],
+  ["V", "forces"],
+  ["O", "open files"],
+  ["?", "this list"],
+];
+
 function keyDown(event) {
   if (event.ctrlKey || event.metaKey || event.altKey || $("help").open) return;
   const at = event.target.tagName;
@@ -158,6 +185,9 @@ async function filesOf(transfer) {
 
 function listen() {
   const element = canvas.element;
+  $("empty").innerHTML = EMPTY;
+  $("speed").append(...SPEEDS.map(([name, speed]) => new Option(name, speed, false, speed === 1)));
+  $("help").innerHTML = `<h2 id="help-head">Keys and mouse</h2><dl>${HELP.map(([keys, text]) => `<dt>${keys}</dt><dd>${text}</dd>`).join("")}</dl><form method="dialog"><button>Close</button></form>`;
   element.addEventListener("pointerdown", pointerDown);
   element.addEventListener("pointermove", pointerMove);
   element.addEventListener("pointerup", pointerUp);
@@ -179,7 +209,7 @@ function listen() {
     await dropped(list);
   });
   $("choose").onclick = () => $("files").click();
-  $("dismiss").onclick = () => (trouble("", ""), renewed());
+  $("dismiss").onclick = () => (trouble("", ""), page.scene || renewed());
   $("play").onclick = () => play();
   $("restart").onclick = restart;
   $("step").onclick = () => steps(1);

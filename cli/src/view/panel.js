@@ -20,16 +20,17 @@ function part(name, isOpen, ...children) {
 /** Most rows of sliders that are shown at once; more are behind a button. */
 const ROWS = 12;
 
-/** A slider with its name and value. `set` gets a number. */
+/** A slider with its name and value. `set` gets a number, and the slider. */
 function slider({ name, low, high, value, unit = "", set, attributes = {} }) {
   const shown = element("output", {}, `${digits(value)} ${unit}`);
   const input = element("input", { type: "range", min: low, max: high, step: "any", value, "aria-label": `${name}${unit ? `, ${unit}` : ""}`, ...attributes });
   input.addEventListener("input", () => {
-    shown.textContent = `${digits(+input.value)} ${unit}`;
-    set(+input.value);
+    input.update(+input.value);
+    set(+input.value, input);
   });
-  input.update = (x) => {
-    if (document.activeElement !== input) input.value = x;
+  // Not while a hand moves it.
+  input.update = (x, always) => {
+    if (always || document.activeElement !== input) input.value = x;
     shown.textContent = `${digits(x)} ${unit}`;
   };
   return element("label", { class: "row", title: name }, element("span", {}, name), input, shown);
@@ -73,6 +74,7 @@ function renewed() {
   const { scene, opened } = page;
   $("empty").hidden = Boolean(scene) || Boolean(opened && !$("trouble").hidden);
   document.body.classList.toggle("bare", !scene);
+  $("bar").hidden = !scene && !opened;
   $("name").textContent = scene?.name ?? "";
   $("facts").textContent = scene ? facts(scene) : "";
   document.title = scene ? `${scene.name} · mbd view` : "mbd view";
@@ -116,10 +118,10 @@ function energyPart() {
 function phasePart(scene) {
   parts.phase = element("canvas", { class: "plot tall", role: "img", "aria-label": "Momentum over coordinate" });
   const plain = scene.coordinates.map((c, k) => [k, c.name]).filter(([k]) => scene.coordinates[k].plain);
-  if (!plain.length) return part("Phase", false, element("p", { class: "muted" }, "no coordinate is a number of its own"));
-  page.phase = Math.min(page.phase ?? 0, scene.nq - 1);
-  if (!scene.coordinates[page.phase].plain) page.phase = plain[0][0];
-  page.cut = plain.length > 1 ? plain[1][0] : plain[0][0];
+  const paired = plain.filter(([k]) => scene.coordinates[k].v !== null);
+  if (!paired.length) return part("Phase", false, element("p", { class: "muted" }, "no coordinate has a momentum of its own"));
+  if (!paired.some(([k]) => k === page.phase)) page.phase = paired[0][0];
+  page.cut = (paired[1] ?? paired[0])[0];
   const cutChoice = choice("where this rises through zero", plain, page.cut, (k) => {
     page.cut = +k;
     setSection();
@@ -131,13 +133,13 @@ function phasePart(scene) {
     setSection();
   });
   if (page.look.section) setSection();
-  return part("Phase", !scene.lie && scene.nv <= 4, choice("coordinate and its momentum", plain, page.phase, (k) => ((page.phase = +k), (page.changed = true))), parts.phase, toggle, cutChoice);
+  return part("Phase", !scene.lie && scene.nv <= 4, choice("coordinate and its momentum", paired, page.phase, (k) => ((page.phase = +k), (page.changed = true))), parts.phase, toggle, cutChoice);
 }
 
 function setSection() {
   page.sections = [];
   page.changed = true;
-  change({ action: "change", call: "section", args: [page.look.section ? page.cut : 4294967295, 0] });
+  change({ action: "section", args: [page.look.section ? page.cut : 4294967295, 0] });
 }
 
 function loopsPart(scene) {
@@ -153,10 +155,7 @@ function contactsPart(scene) {
   if (!scene.contacts.length) return null;
   parts.contacts = element("p", { class: "figure" });
   parts.modes = scene.contacts.slice(0, 40).map((name) => element("li", { "data-mode": 0 }, name));
-  return part("Contacts", true, choice("followed", [[2, "by events, or steps where they crowd"], [0, "by events only"], [1, "by time steps"]], page.settings.contacts, (k) => {
-    page.settings.contacts = +k;
-    change({ action: "settings", settings: page.settings });
-  }), parts.contacts, element("ul", { class: "modes" }, ...parts.modes));
+  return part("Contacts", true, choice("followed", [[2, "by events, or steps where they crowd"], [0, "by events only"], [1, "by time steps"]], page.settings.contacts, (k) => setting("contacts", +k)), parts.contacts, element("ul", { class: "modes" }, ...parts.modes));
 }
 
 function pullPart() {
@@ -178,23 +177,23 @@ function startPart(scene) {
 function begin(k, x, velocity) {
   page.playing = false;
   paused();
-  page.sections = [];
-  latest(`start ${velocity} ${k}`, () => change({ action: "change", call: "set_start", args: [k, x, velocity ? 1 : 0] }, true));
+  latest(`start ${velocity} ${k}`, async () => {
+    const answer = await change({ action: "change", call: "set_start", args: [k, x, velocity ? 1 : 0] }, true);
+    if (answer?.ok) page.sections = [];
+  });
 }
 
 function effortsPart(scene) {
   const weight = page.figure.weight() * scene.extent;
   const list = scene.velocities.map((c, k) => {
     const most = c.limit ?? +(c.unit === "m" ? weight / scene.extent : 0.5 * weight).toPrecision(2);
-    return slider({ name: c.name, unit: c.unit === "m" ? "N" : "N m", low: -most, high: most, value: 0, set: (x) => {
+    return slider({ name: c.name, unit: c.unit === "m" ? "N" : "N m", low: -most, high: most, value: page.efforts[k], set: (x) => {
       page.efforts[k] = x;
-      latest(`effort ${k}`, () => change({ action: "change", call: "set_effort", args: [k, x] }));
+      latest(`effort ${k}`, () => changeShown({ action: "change", call: "set_effort", args: [k, x] }));
     } });
   });
   const zero = element("button", { type: "button", onclick: () => {
-    page.efforts.forEach((x, k) => x && change({ action: "change", call: "set_effort", args: [k, 0] }));
-    page.efforts.fill(0);
-    $("panel").querySelectorAll("[data-part=Efforts] input").forEach((input) => ((input.value = 0), input.dispatchEvent(new Event("input"))));
+    $("panel").querySelectorAll("[data-part=Efforts] input").forEach((input) => +input.value && ((input.value = 0), input.dispatchEvent(new Event("input"))));
   } }, "all to zero");
   return part("Efforts", false, ...rows(list), zero);
 }
@@ -203,9 +202,12 @@ function parametersPart(scene) {
   if (!scene.params.length) return null;
   return part("Parameters", true, ...rows(scene.params.map(({ name, value }, k) => {
     const [low, high] = value > 0 ? [0.2 * value, 3 * value] : value < 0 ? [3 * value, 0.2 * value] : [-1, 1];
-    return slider({ name, low, high, value, set: (x) => latest(`param ${k}`, async () => {
-      const answer = await change({ action: "change", call: "set_parameter", args: [k, x] });
-      if (answer?.ok) await redescribe();
+    return slider({ name, low, high, value, set: (x, input) => latest(`param ${k}`, async () => {
+      const answer = await changeShown({ action: "change", call: "set_parameter", args: [k, x] });
+      if (answer?.ok) {
+        scene.params[k].value = x;
+        await redescribe();
+      } else if (answer && +input.value === x) input.update(scene.params[k].value, true);
     }) });
   })));
 }
@@ -240,13 +242,16 @@ function lookPart(scene) {
   return part("Picture", false, ...list);
 }
 
+/** Goes on from what is shown with another setting. */
+async function setting(key, value) {
+  page.settings[key] = value;
+  await changeShown({ action: "settings", settings: page.settings });
+  unmeasured();
+}
+
 function motionPart() {
-  const set = (key, number) => (value) => {
-    page.settings[key] = number ? +value : value;
-    change({ action: "settings", settings: page.settings });
-  };
   parts.speed = element("p", { class: "figure" });
-  return part("Method", false, choice("method", METHODS, page.settings.method, set("method", false)), choice("step", [[1e-4, "0.1 ms"], [2.5e-4, "0.25 ms"], [5e-4, "0.5 ms"], [1e-3, "1 ms"], [2e-3, "2 ms"], [5e-3, "5 ms"]], page.settings.step, set("step", true)), parts.speed);
+  return part("Method", false, choice("method", METHODS, page.settings.method, (value) => setting("method", value)), choice("step", [[1e-4, "0.1 ms"], [2.5e-4, "0.25 ms"], [5e-4, "0.5 ms"], [1e-3, "1 ms"], [2e-3, "2 ms"], [5e-3, "5 ms"]], page.settings.step, (value) => setting("step", +value)), parts.speed);
 }
 
 function filePart(scene, opened) {
@@ -281,7 +286,7 @@ function panelDraw(ink) {
     const curves = [curve("kinetic", ink.lines[0], (i) => i.kinetic), curve("potential", ink.lines[1], (i) => i.potential), curve("total", ink.lines[2], (i) => i.total)];
     if (list.some((i) => i.spring > 0)) curves.push(curve("spring", ink.lines[5], (i) => i.spring));
     plot(parts.energy, curves, ink, { now });
-    const kinetic = list.reduce((most, i) => Math.max(most, Math.abs(i.kinetic)), 0), largest = list.reduce((most, i) => Math.max(most, Math.abs(i.error)), 0);
+    const [kinetic, largest] = history.at(-1).most;
     plot(parts.error, [{ colour: ink.lines[5], points: list.map((i) => [i.t, i.error]) }], ink, { now, least: 1e-14 * Math.max(kinetic, 1e-300) });
     parts.errorText.textContent = `now ${digits(instant.error)} J, at most ${digits(largest)} J${kinetic > 0 ? `: ${digits(largest / kinetic)} of the largest kinetic energy` : ""}${instant.work ? `; work of efforts, dampers and hand's damper ${digits(instant.work)} J` : ""}`;
   }
@@ -300,21 +305,19 @@ function panelDraw(ink) {
   const hand = instant.hand();
   if (isOpen(parts.pull)) parts.pull.textContent = hand ? `force ${digits(size(hand.force))} N, energy of the spring ${digits(instant.spring)} J` : "Drag a body in the picture: a spring pulls it.";
   if (isOpen(parts.speed)) parts.speed.textContent = page.slow > 0.3 ? "This machine is slower than the motion: time runs slower." : `time of computing ${page.measured.steps ? digits(1000 * page.measured.spent / page.measured.steps) : "–"} µs a step`;
-  for (const input of $("panel").querySelectorAll("details[open] [data-q]")) input.update(wrapped(instant.q(+input.dataset.q), +input.min, +input.max));
+  for (const input of $("panel").querySelectorAll("details[open] [data-q]")) input.update(wrapped(+input.dataset.q, instant.q(+input.dataset.q), +input.min, +input.max));
   for (const input of $("panel").querySelectorAll("details[open] [data-v]")) input.update(instant.v(+input.dataset.v));
 }
 
-/** An angle within the range of a slider, if turns bring it there. */
-const wrapped = (x, low, high) => (x < low || x > high ? x - 2 * Math.PI * Math.round((x - (low + high) / 2) / (2 * Math.PI)) : x);
+/** A coordinate; an angle within a range, if turns bring it there. */
+const wrapped = (k, x, low, high) => (page.scene.coordinates[k].unit === "rad" && (x < low || x > high) ? x - 2 * Math.PI * Math.round((x - (low + high) / 2) / (2 * Math.PI)) : x);
 
 function phaseDraw(ink, list) {
-  const { phase: k, instant, scene } = page, momentum = Math.min(k, scene.nv - 1);
-  const labels = [scene.coordinates[k].name, "p"];
+  const { phase: k, instant, scene } = page, { name, v } = scene.coordinates[k], labels = [name, "p"];
   if (page.look.section) {
-    const turn = (x) => (scene.coordinates[k].unit === "rad" ? wrapped(x, -Math.PI, Math.PI) : x);
-    const points = page.sections.slice(-4000).map((s) => [turn(s[k]), s[scene.nq + momentum]]);
+    const points = page.sections.slice(-4000).map((s) => [wrapped(k, s[k], -Math.PI, Math.PI), s[scene.nq + v]]);
     plot(parts.phase, [{ colour: ink.lines[0], points, dots: true }], ink, { labels, empty: "no crossing yet: let it run" });
     return;
   }
-  plot(parts.phase, [{ colour: ink.lines[3], points: thinned(list, 500).map((i) => [i.q(k), i.p(momentum)]) }], ink, { labels, point: [instant.q(k), instant.p(momentum)] });
+  plot(parts.phase, [{ colour: ink.lines[3], points: thinned(list, 500).map((i) => [i.q(k), i.p(v)]) }], ink, { labels, point: [instant.q(k), instant.p(v)] });
 }

@@ -17,17 +17,24 @@ const actions = {
   /** Steps, with the hand that holds a body moved before; what is seen after every `each` of them, however rarely is drawn. */
   frame({ steps, most, each = steps, forces, hand }) {
     const begin = performance.now(), seen = [];
+    let spent = 0;
     if (hand) engine.exports.pull_to(...hand);
     for (let done = 0; ; ) {
-      const some = Math.min(each, steps - done), got = engine.advance(some, most - (performance.now() - begin));
+      const some = Math.min(each, steps - done), from = performance.now(), got = engine.advance(some, most - (from - begin));
+      spent += performance.now() - from;
       done += got.done;
       seen.push(engine.look(forces));
-      if (done === steps || got.done < some) return { numbers: seen.pop(), seen, done, trouble: got.trouble, spent: performance.now() - begin };
+      if (done === steps || got.done < some) return { numbers: seen.pop(), seen, done, trouble: got.trouble, spent };
     }
   },
-  state({ t, values, forces }) {
+  /** Goes to a state that is shown already. */
+  state({ t, values }) {
     engine.setState(t, values);
-    return { numbers: engine.look(forces) };
+    return {};
+  },
+  section({ args }) {
+    engine.exports.section(...args);
+    return {};
   },
   /** A call that changes something; `ok` is false where it was refused, with a text. */
   change({ call, args, forces }) {

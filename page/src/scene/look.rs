@@ -1,8 +1,9 @@
 //! What the page shows of an instant, and what it keeps of a step: crossings of a section.
 
-use multibody::codegen::model::ConstraintKind;
+use multibody::codegen::model::{ConstraintKind, Unit};
 use multibody::runtime::spatial::cross;
 use multibody::runtime::sweep::FrameState;
+use multibody::runtime::tree::Source;
 use multibody::runtime::Constrained;
 
 use super::{value, Scene};
@@ -15,15 +16,27 @@ impl Scene {
     /// Keeps crossings of a coordinate upwards through a value; those of an angle are the same after whole turns. `None` of
     /// a coordinate keeps none.
     pub fn set_section(&mut self, section: Option<(usize, f64)>) {
-        self.section = section.filter(|(k, _)| *k < self.plan.dims.nq);
+        let section = section.filter(|(k, _)| *k < self.plan.dims.nq);
+        self.section = section.map(|(k, level)| (k, level, self.is_angle(k)));
         self.crossings.clear();
+    }
+
+    fn is_angle(&self, k: usize) -> bool {
+        self.plan.slots.iter().any(|slot| {
+            let Some(Source::State { q, .. }) = slot.at else { return false };
+            let coordinates = self.plan.model.joints[slot.joint].kind.spec().coordinates;
+            k >= q && coordinates.get(k - q).is_some_and(|coordinate| coordinate.unit == Unit::Radian)
+        })
     }
 
     /// Keeps the state where the section was crossed in the last step, which began at a state, as if it were straight.
     pub(super) fn cross(&mut self, before: &[f64]) {
-        let Some((k, level)) = self.section else { return };
-        let turn = std::f64::consts::TAU;
-        let a = (before[k] - level + 0.5 * turn).rem_euclid(turn) - 0.5 * turn;
+        let Some((k, level, is_angle)) = self.section else { return };
+        let mut a = before[k] - level;
+        if is_angle {
+            let turn = std::f64::consts::TAU;
+            a = (a + 0.5 * turn).rem_euclid(turn) - 0.5 * turn;
+        }
         let b = a + self.q[k] - before[k];
         if a < 0.0 && b >= 0.0 && self.crossings.len() < MOST_CROSSINGS {
             let part = -a / (b - a);
