@@ -45,6 +45,7 @@ where
     p: Y::Momenta,
     qd: Y::Coordinates,
     work: Y::Momenta,
+    /// Sizes of coordinates and momenta at the start of the step.
     size: (f64, f64),
 }
 
@@ -132,7 +133,8 @@ where
 
     /// Computes the stages from the rates. Returns the largest change relative to the state.
     fn insert(&mut self, h: Y::Scalar) -> f64 {
-        let mut change = (0.0_f64, 0.0_f64);
+        // That of earlier iterates does not count.
+        let (mut change, mut size) = ((0.0_f64, 0.0_f64), self.size);
         for (z, row) in self.z.iter_mut().zip(&self.a) {
             self.new.clear();
             for (f, a) in self.f.iter().zip(row) {
@@ -142,10 +144,10 @@ where
             z.add(Y::Scalar::one(), &self.new);
             change = (largest(change.0, z.x.as_ref()), largest(change.1, z.p.as_ref()));
             z.copy_from(&self.new);
-            self.size = (largest(self.size.0, z.x.as_ref()), largest(self.size.1, z.p.as_ref()));
+            size = (largest(size.0, z.x.as_ref()), largest(size.1, z.p.as_ref()));
         }
         let part = |change: f64, size: f64| if change == 0.0 { 0.0 } else { change / size };
-        part(change.0, self.size.0).max(part(change.1, self.size.1))
+        part(change.0, size.0).max(part(change.1, size.1))
     }
 
     /// Makes one iteration. Returns the size of its change.
@@ -218,6 +220,10 @@ where
 {
     fn order(&self) -> u32 {
         RADAU5.order
+    }
+
+    fn begin(&mut self) {
+        self.lambda.iter_mut().for_each(|lambda| lambda.as_mut().fill(Y::Scalar::zero()));
     }
 
     fn attempt(
