@@ -67,6 +67,7 @@ while read -r model function limit; do
     case $function in free | far) calls=10 ;; *) calls=1000 ;; esac
     few=$(collected "$model" "$function" $((calls / 10)))
     many=$(collected "$model" "$function" $((calls + calls / 10)))
+    [ "${few:-0}" -gt 0 ] && [ "${many:-0}" -gt "$few" ] || { echo "$model $function: nothing was counted" >&2; exit 1; }
     count=$(((many - few) / calls))
     [ "$function" != free ] || free=$count
     # Contacts that are far away may cost a twentieth of a motion.

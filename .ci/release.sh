@@ -49,7 +49,10 @@ if cargo publish "${options[@]}" "${names[@]}" > "$log" 2>&1; then
     grep -E 'Packag(ed|ing)' "$log"
 elif [ -z "$full" ] && grep -qiE 'HTTP request|could not resolve|network|timed out' "$log"; then
     echo "the registry cannot be reached: files of the packages only"
-    for crate in "${crates[@]}"; do echo "$crate: $(cargo package --list --allow-dirty --locked -p "$crate" | wc -l) files"; done
+    for crate in "${crates[@]}"; do
+        files=$(cargo package --list --allow-dirty --locked -p "$crate")
+        echo "$crate: $(wc -l <<< "$files") files"
+    done
 else
     cat "$log" >&2
     exit 1

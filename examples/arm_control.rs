@@ -15,8 +15,8 @@ const NV: usize = Ur5::NV;
 /// Period of the controller, s.
 const PERIOD: f64 = 1e-3;
 
-/// Joint angles (rad) of the path at time `t` (s), their rates and accelerations: half a turn of every joint to and
-/// fro.
+/// Joint angles (rad) of the path at time `t` (s), their rates and accelerations: every joint swings to 0.5 to 1 rad and back
+/// in 2π s.
 fn path(t: f64) -> [[f64; NV]; 3] {
     let (s, c) = t.sin_cos();
     let size: [f64; NV] = core::array::from_fn(|k| 0.5 - 0.05 * k as f64);

@@ -12,10 +12,11 @@ const N: usize = Ur5::NQ;
 /// Columns of some states: `q[k][s]` is coordinate `k` of state `s`.
 type Columns = [Vec<f64>; N];
 
-/// `states` arms that start at rest at angles of their own, rad.
-fn starts(states: usize) -> [Columns; 2] {
+/// Arms that start at rest at angles of their own, rad, by their numbers.
+fn starts(numbers: std::ops::Range<usize>) -> [Columns; 2] {
     let angle = |k: usize, s: usize| 0.8 * ((1 + k + N * s) as f64 * 0.618_033_988_75).fract() - 0.4;
-    [core::array::from_fn(|k| (0..states).map(|s| angle(k, s)).collect()), core::array::from_fn(|_| vec![0.0; states])]
+    let at_rest = core::array::from_fn(|_| vec![0.0; numbers.len()]);
+    [core::array::from_fn(|k| numbers.clone().map(|s| angle(k, s)).collect()), at_rest]
 }
 
 /// `steps` steps of the midpoint rule of `h` seconds for all states of the columns.
@@ -61,10 +62,10 @@ pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let clock = Instant::now();
     let errors: Vec<f64> = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..threads)
-            .map(|_| {
+            .map(|worker| {
                 let arm = arm.clone();
                 scope.spawn(move || {
-                    let [mut q, mut p] = starts(share);
+                    let [mut q, mut p] = starts(worker * share..(worker + 1) * share);
                     let before = mean_energy(&arm, &q, &p);
                     roll_out(&arm, &mut q, &mut p, h, steps);
                     (mean_energy(&arm, &q, &p) - before).abs()

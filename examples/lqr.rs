@@ -3,7 +3,8 @@
 //! `cargo run --release --example lqr`
 //!
 //! The generated code gives `p`, `ṗ` and their derivatives at given `(q, v)` (output `momentum_derivatives`). With
-//! `p = M(q) v` the linear system is `M δv̇ = (∂ṗ/∂q) δq + (∂ṗ/∂v − Ṁ) δv + δτ`; at rest `Ṁ = 0`.
+//! `p = M(q) v` the linear system about an equilibrium at rest is `M δv̇ = (∂ṗ/∂q) δq + (∂ṗ/∂v) δv + δτ`. (About a motion,
+//! `−d/dt(∂p/∂q)` belongs to `∂ṗ/∂q`, and `−Ṁ − ∂p/∂q` to `∂ṗ/∂v`.)
 
 use multibody::prelude::*;
 use nalgebra::{SMatrix, Vector4};

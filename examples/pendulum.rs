@@ -11,7 +11,7 @@ multibody::mbd_model! {
     frames = [tip],
 }
 
-/// Swings the pendulum and returns the largest error of its energy, J.
+/// Swings the pendulum.
 pub fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut pendulum = DoublePendulum::new();
 

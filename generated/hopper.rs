@@ -103,7 +103,7 @@ impl Hopper {
         [::multibody::runtime::contact::Mode::Slide, ::multibody::runtime::contact::Mode::Slide, ::multibody::runtime::contact::Mode::Slide],
     ];
 
-    /// Parameters, gravity and which rows act at their defaults, prescribed joints in their neutral positions, all else zero.
+    /// All inputs zero, parameters at their defaults.
     pub const fn new() -> Self {
         Hopper { tau: [0.0; 2], acts: [0.0, 0.0, 0.0, 0.0, 0.0], contacts: [::multibody::runtime::contact::Contact { row: 0, tangents: true, friction: 0.0, restitution: 0.0, law: ::multibody::runtime::contact::RestitutionLaw::Poisson }, ::multibody::runtime::contact::Contact { row: 3, tangents: false, friction: 0.0, restitution: 0.0, law: ::multibody::runtime::contact::RestitutionLaw::Poisson }, ::multibody::runtime::contact::Contact { row: 4, tangents: false, friction: 0.0, restitution: 0.0, law: ::multibody::runtime::contact::RestitutionLaw::Poisson }], set: 0 }
     }

@@ -76,7 +76,7 @@ impl Satellite {
     /// Index of the reaction of joint `drive_right`.
     pub const REACTION_DRIVE_RIGHT: usize = 2;
 
-    /// Parameters, gravity and which rows act at their defaults, prescribed joints in their neutral positions, all else zero.
+    /// Parameters at their defaults, prescribed joints in their neutral positions, all other inputs zero.
     pub const fn new() -> Self {
         Satellite { tau: [0.0; 6], drive_q: [0.0, 0.0], drive_v: [0.0; 2], drive_a: [0.0; 2], wrenches: [[0.0; 6]; 1] }
     }
@@ -4472,7 +4472,7 @@ pub struct SatelliteLanes<const LANES: usize> {
 #[allow(clippy::all, clippy::pedantic, dead_code, unused_variables, non_snake_case)]
 #[rustfmt::skip]
 impl<const LANES: usize> SatelliteLanes<LANES> {
-    /// Parameters, gravity and which rows act at their defaults, prescribed joints in their neutral positions, all else zero.
+    /// Parameters at their defaults, prescribed joints in their neutral positions, all other inputs zero.
     pub fn new() -> Self {
         Satellite::new().lanes()
     }

@@ -5,7 +5,8 @@
 //! as well; so the norm can drift within the tolerances only, unlike in the methods of
 //! [`runtime::integrate`](crate::runtime::integrate), which are what to prefer on joints with quaternions. Without
 //! joints with quaternions and planar joints the derivatives are the exact ones of [`Differentiable`]; with them,
-//! differences of the rates: they serve Newton's iteration alone, whose result does not depend on them.
+//! differences of the rates: they serve Newton's iteration alone, whose result does not depend on them. Nothing keeps loops
+//! closed: of mechanisms with constraints, positions drift within the tolerances.
 //!
 //! ```
 //! use multibody::diffsol::{Diffsol, Stiff};

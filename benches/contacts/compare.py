@@ -96,7 +96,7 @@ def mujoco_settings(scene, step):
     default, hard = "0.9 0.95 0.001 0.5 2", "0.99 0.9999 0.0001 0.5 2"
 
     def one(integrator, solref, solimp, **more):
-        # Its own tolerance and limit of iterations where its own hardness of contacts stays, too.
+        # Its own tolerance and limit of iterations with its own impedances.
         exact = {} if solimp == default else {"tolerance": 1e-12, "iterations": 200}
         option = {"timestep": step, "integrator": integrator, "cone": "elliptic"} | exact
         return {"option": option | more, "solref": solref, "solimp": solimp, "limits": solref if solref[0] != "-" else "0.02 1"}

@@ -140,8 +140,8 @@ report only.
   solves another problem than rigid contact, on purpose, and no step makes its answers converge to that of the rigid one:
   only harder settings do, until the step is too long for them. Its settings: `default` (implicitfast, elliptic cones),
   `impratio 100`, `stiff` (and a time constant of two steps, its least), `hard` (and impedances of 0.99 to 0.9999), `no slip`
-  (and 20 iterations that reduce slip), `RK4`. Where its hardness is not its own, its solver has a tolerance of 1e-12 and 200
-  iterations. The ball needs a spring and damper that give the restitution: as stiff as 10
+  (and 20 iterations that reduce slip), `RK4`. Its solver has its own tolerance and iterations in `default`, `impratio 100` and
+  `stiff`, and 1e-12 and 200 in the others. The ball needs a spring and damper that give the restitution: as stiff as 10
   or 40 steps resolve. Moments of inertia of zero, which it refuses, are 1e-9 kg m² there, and points are balls of 1 µm.
 {drake}- *Faster* is the time of a program for its least error over ours for no more. The aim is 10. *Least advantage* is the same for
   the worst for us of all its runs with errors of at most {useful:g} m: programs that need not be exact are quick. Best errors of

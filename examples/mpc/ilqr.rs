@@ -141,6 +141,10 @@ impl<S: Real, const NX: usize, const NU: usize, const N: usize> Ilqr<S, NX, NU, 
             self.cautious();
             return Progress::Rejected;
         };
+        if !(self.cost.is_finite() && linear.is_finite()) {
+            self.cautious();
+            return Progress::Rejected;
+        }
         let least = S::constant(8.0 * S::epsilon()) * self.cost;
         let falls = -linear > least;
         if !falls {

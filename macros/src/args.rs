@@ -198,12 +198,11 @@ impl Args {
                 self.options.arithmetic = choice("arithmetic", value, &Arithmetic::ALL.map(|a| (a.name(), a)))?;
             }
             "from" => self.from = from(value)?,
-            // The second words are those of before 0.1.
-            "elimination" | "forms" => {
+            "elimination" => {
                 let choices = EliminationStrategy::ALL.map(|e| (e.name(), e));
                 self.options.plan.elimination = choice(&word, value, &choices)?;
             }
-            "rolled" | "loops" => {
+            "rolled" => {
                 self.options.plan.rolled = choice(&word, value, &RolledCode::ALL.map(|r| (r.name(), r)))?;
             }
             "branches" => {

@@ -1,4 +1,4 @@
-//! Measures of errors of lists. A maximum passes over numbers that are not finite; these do not.
+//! Measures of errors of lists. Differences are infinite where a number is not finite, over which a maximum passes.
 
 /// The largest absolute value, at least `least`.
 pub fn largest(list: &[f64], least: f64) -> f64 {

@@ -236,10 +236,16 @@ async function rejoin() {
   await change({ action: "state", t: page.instant.t, values: [...page.instant.state()] });
 }
 
-/** A change of the motion from what is shown on. */
+/** A change of the motion from what is shown on. Where it is refused, what came later is there again. */
 async function changeShown(question) {
+  const { history, shown } = page, later = history.slice(shown + 1), end = history.at(-1);
   await rejoin();
-  return change(question);
+  const answer = await change(question);
+  if (answer?.ok === false && later.length && page.history === history) {
+    history.push(...later);
+    await change({ action: "state", t: end.t, values: [...end.state()] });
+  }
+  return answer;
 }
 
 async function play(on = !page.playing) {

@@ -122,6 +122,18 @@ const EMPTY = `<h2>Drop a mechanism here</h2>
 <p><button id="choose" type="button">Choose files</button></p>
 <p class="muted">Files stay on this machine: the page makes no request.</p>`;
 
+/** A button of the bar, with a drawing. */
+const button = (id, title, label, path, name = "") =>
+  `<button id="${id}" type="button" title="${title}" aria-label="${label}"><svg viewBox="0 0 16 16" aria-hidden="true"><path${name} d="${path}"/></svg></button>`;
+
+/** The bar below the picture. */
+const BAR = `${button("restart", "Back to the start (R)", "Back to the start", "M3 3v10M13 3 5 8l8 5z")}
+${button("play", "Play or pause (space)", "Play", "M4 2.5v11l9-5.5z", ' id="play-icon"')}
+${button("step", "One step (.)", "One step", "M4 3l7 5-7 5zM13 3v10")}
+<input id="scrub" type="range" min="0" max="1" step="any" value="1" aria-label="Time of what is shown">
+<output id="clock" aria-live="off">0.000 s</output>
+<label class="speed">speed <select id="speed" aria-label="Speed of the motion"></select></label>`;
+
 /** Speeds of the motion, as they are called. */
 const SPEEDS = [["1/20", 0.05], ["1/10", 0.1], ["1/4", 0.25], ["1/2", 0.5], [1, 1], [2, 2], [4, 4]];
 
@@ -186,6 +198,7 @@ async function filesOf(transfer) {
 function listen() {
   const element = canvas.element;
   $("empty").innerHTML = EMPTY;
+  $("bar").innerHTML = BAR;
   $("speed").append(...SPEEDS.map(([name, speed]) => new Option(name, speed, false, speed === 1)));
   $("help").innerHTML = `<h2 id="help-head">Keys and mouse</h2><dl>${HELP.map(([keys, text]) => `<dt>${keys}</dt><dd>${text}</dd>`).join("")}</dl><form method="dialog"><button>Close</button></form>`;
   element.addEventListener("pointerdown", pointerDown);

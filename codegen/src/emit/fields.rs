@@ -37,9 +37,11 @@ impl Field {
 
 /// What the fields are at first, for comments.
 pub fn initial(fields: &[Field]) -> &'static str {
-    match fields.iter().any(|field| ["drive_q", "gravity", "acts"].contains(&field.name)) {
-        false => "All inputs zero, parameters at their defaults.",
-        true => "Parameters, gravity and which rows act at their defaults, prescribed joints in their neutral positions, all else zero.",
+    match ["gravity", "drive_q"].map(|name| fields.iter().any(|field| field.name == name)) {
+        [false, false] => "All inputs zero, parameters at their defaults.",
+        [true, false] => "Parameters and gravity at their defaults, all other inputs zero.",
+        [false, true] => "Parameters at their defaults, prescribed joints in their neutral positions, all other inputs zero.",
+        [true, true] => "Parameters and gravity at their defaults, prescribed joints in their neutral positions, all other inputs zero.",
     }
 }
 

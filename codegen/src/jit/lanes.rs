@@ -92,7 +92,7 @@ impl Compiled<f64> {
 }
 
 impl<const L: usize> CompiledLanes<L> {
-    /// Gives a lane the inputs and parameters of a mechanism of the same model.
+    /// Gives a lane the inputs and parameters of a mechanism of the same model; prescribed joints stay where they are there.
     pub fn take_inputs(&mut self, lane: usize, of: &Compiled<f64>) {
         for (to, from) in self.fields.iter_mut().zip(of.fields()) {
             set::<L>(to, lane, from);

@@ -431,7 +431,7 @@ pub struct JointBounds {
 }
 
 impl Joint {
-    /// Whether the origin of its body moves with it.
+    /// Whether it has a translation among its freedoms; that of a helical joint belongs to a rotation.
     pub(crate) fn travels(&self) -> bool {
         self.kind.spec().freedoms.iter().any(|freedom| freedom.unit == Unit::Metre)
     }

@@ -187,18 +187,11 @@ impl Plan {
         let x = node.inertia.map(S::constant);
         let fixed =
             RigidInertia { mass: x[0], moment: [x[1], x[2], x[3]], inertia: [x[4], x[5], x[6], x[7], x[8], x[9]] };
-        node.variable.iter().fold(fixed, |sum, (b, pose)| sum.plus(&self.inertia_of_body(*b, pose, self.snap, params)))
+        node.variable.iter().fold(fixed, |sum, (b, pose)| sum.plus(&self.inertia_of_body(*b, pose, params)))
     }
 
-    /// Inertia of body `b` of the model at the frame in which it stands at `pose`, with given parameters; `snap` as in
-    /// [`Plan::new`], for its axes.
-    pub(crate) fn inertia_of_body<S: Scalar>(
-        &self,
-        b: usize,
-        pose: &[PoseStep],
-        snap: f64,
-        params: &[S],
-    ) -> RigidInertia<S> {
+    /// Inertia of body `b` of the model at the frame in which it stands at `pose`, with given parameters.
+    pub(crate) fn inertia_of_body<S: Scalar>(&self, b: usize, pose: &[PoseStep], params: &[S]) -> RigidInertia<S> {
         let (o, one) = (S::zero(), S::one());
         let identity = [[one, o, o], [o, one, o], [o, o, one]];
         let body = &self.model.bodies[b];
@@ -207,7 +200,7 @@ impl Plan {
         for step in steps(pose, params) {
             step.pose(&mut rot, &mut pos);
         }
-        for step in steps(&rotation(&body.inertia_axes, snap, &mut |_| {}), params) {
+        for step in steps(&rotation(&body.inertia_axes, self.snap, &mut |_| {}), params) {
             step.pose(&mut axes, &mut nowhere);
         }
         body_inertia(of(body.mass), body.com.map(of), body.inertia.map(of), &axes, &rot, pos)

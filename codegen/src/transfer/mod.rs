@@ -431,8 +431,8 @@ fn shared_bodies(
         let (Some(&before), Some(&f), Some(&t)) = (old.get(name), in_old.get(name), in_new.get(name)) else {
             return Err(missing(name, from));
         };
-        let inertia = to.inertia_of_body(b, &[], to.snap, to_params);
-        let other = from.inertia_of_body(before, &[], from.snap, from_params);
+        let inertia = to.inertia_of_body(b, &[], to_params);
+        let other = from.inertia_of_body(before, &[], from_params);
         let (x, y) = (inertia.parameters(), other.parameters());
         let near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * a.abs().max(b.abs());
         // Moments and products of inertia are compared with the largest of them.

@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for k in 0..1000 {
         rk4.step(&mut arm, f64::from(k) * 1e-3, 1e-3, &mut q, &mut p)?;
     }
-    let lost = (arm.energy(&q, &p).iter().sum::<f64>() - start).abs();
-    println!("after 1 s: {q:.3?}; the energy is off by {lost:.1e} J");
+    let lost = start - arm.energy(&q, &p).iter().sum::<f64>();
+    println!("after 1 s: {q:.3?}; the dampers of the joints have taken {lost:.1} J");
     Ok(())
 }

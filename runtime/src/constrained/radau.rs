@@ -222,10 +222,6 @@ where
         RADAU5.order
     }
 
-    fn begin(&mut self) {
-        self.lambda.iter_mut().for_each(|lambda| lambda.as_mut().fill(Y::Scalar::zero()));
-    }
-
     fn attempt(
         &mut self,
         step: &mut Attempt<Y>,

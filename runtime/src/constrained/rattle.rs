@@ -229,10 +229,6 @@ where
         2
     }
 
-    fn begin(&mut self) {
-        self.lambda.as_mut().fill(Y::Scalar::zero());
-    }
-
     fn attempt(
         &mut self,
         step: &mut Attempt<Y>,

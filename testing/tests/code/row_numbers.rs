@@ -12,6 +12,7 @@ use mbd_codegen::search;
 use mbd_runtime::sweep::FrameState;
 use mbd_testing::conformance::evaluate;
 use mbd_testing::eliminations::random_plan;
+use mbd_testing::relative_error;
 use mbd_testing::state::random_state;
 
 /// A planar chain of ten links whose last joint stands at a stop, with a ball that touches the floor.
@@ -57,13 +58,6 @@ fn computed(plan: &Plan, seed: u64) -> [Vec<f64>; 2] {
     [a, lambda]
 }
 
-fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
-    assert_eq!(a.len(), b.len());
-    assert!(a.iter().chain(b).all(|x| x.is_finite()));
-    let size = a.iter().fold(1.0_f64, |most, x| most.max(x.abs()));
-    a.iter().zip(b).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs() / size))
-}
-
 #[test]
 fn rows_that_are_added_after_the_search_have_numbers_of_their_own_for_accelerations() {
     let model = chain();
@@ -81,7 +75,7 @@ fn rows_that_are_added_after_the_search_have_numbers_of_their_own_for_accelerati
             let acts: Vec<bool> = (0..full.dims.rows).map(|r| row == full.dims.rows || r == row).collect();
             let [found, reference] = [&full, &plain.with_contacts()].map(|plan| computed(&plan.acting(&acts), seed));
             for (found, reference) in found.iter().zip(&reference) {
-                let difference = largest_difference(reference, found);
+                let difference = relative_error(found, reference, 1.0);
                 assert!(difference < 1e-9, "seed {seed}, rows {acts:?}: {difference:.1e}\n{reference:?}\n{found:?}");
             }
         }
