@@ -1,5 +1,7 @@
 //! The table of a simulation: which columns it has, and their numbers.
 
+use std::collections::BTreeSet;
+
 use multibody::codegen::plan::Plan;
 use multibody::codegen::words::{did_you_mean, list, quote};
 use multibody::runtime::sweep::FrameState;
@@ -125,16 +127,9 @@ pub fn chosen(plan: &Plan, asked: &[String], controlled: bool) -> Outcome<Column
             None => groups.push((group, vec![column])),
         }
     }
-    let mut known = Vec::new();
-    for (_, columns) in &mut groups {
-        // A column that is asked for twice is written once.
-        columns.retain(|(_, name)| {
-            !known.contains(name) && {
-                known.push(name.clone());
-                true
-            }
-        });
-    }
+    // A column that is asked for twice is written once.
+    let mut seen = BTreeSet::new();
+    groups.iter_mut().for_each(|(_, columns)| columns.retain(|(_, name)| seen.insert(name.clone())));
     groups.retain(|(_, columns)| !columns.is_empty());
     let has = |group| groups.iter().any(|(g, _)| *g == group);
     if has(Group::Efforts) && !controlled {

@@ -104,11 +104,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     writable(&svg)?;
     let drawing = picture::drawing(&plan, args)?;
     if let Some(file) = &args.picture {
-        if same_file(file, &csv) || same_file(file, &svg) {
-            let what = format!("--picture: `{}` is to hold the table or plot already", file.display());
-            return Err(Failure::new(what, "give it a name of its own"));
-        }
-        writable(file)?;
+        of_its_own(("--picture", file), "the table or plot", &[&csv, &svg])?;
     }
     if let Some(file) = &args.record_modes {
         if settings.regimes.choice == RegimeChoice::TimeSteps {
@@ -117,12 +113,8 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
                 "leave `--contacts stepping` out: modes are those between events",
             ));
         }
-        let others = [Some(&csv), Some(&svg), args.picture.as_ref()];
-        if others.into_iter().flatten().any(|other| same_file(file, other)) {
-            let what = format!("--record-modes: `{}` is to hold another result already", file.display());
-            return Err(Failure::new(what, "give it a name of its own"));
-        }
-        writable(file)?;
+        let others: Vec<&PathBuf> = [&csv, &svg].into_iter().chain(&args.picture).collect();
+        of_its_own(("--record-modes", file), "another result", &others)?;
     }
     verdict::start(path, &plan, &q)?;
     let of_contacts = [
@@ -223,6 +215,15 @@ fn about_control(args: &SimulateArgs, settings: &Settings, record: &Record, out:
         writeln!(out, "{line}")?;
     }
     Ok(())
+}
+
+/// Refuses the file of an option that cannot be written, or that holds one of the other results.
+fn of_its_own((option, file): (&str, &Path), holds: &str, others: &[&PathBuf]) -> Outcome {
+    if others.iter().any(|other| same_file(file, other)) {
+        let what = format!("{option}: `{}` is to hold {holds} already", file.display());
+        return Err(Failure::new(what, "give it a name of its own"));
+    }
+    writable(file)
 }
 
 /// Ends a command whose run was interrupted, after its files were written.

@@ -1,5 +1,7 @@
 //! Options of the generator.
 
+use std::collections::BTreeSet;
+
 use crate::choice::choice;
 use crate::modes::ModeChoice;
 use crate::output::{Output, Search};
@@ -166,12 +168,8 @@ impl Options {
     /// those that they lack. Outputs that are listed more than once are there once.
     pub fn of_model(&self, constrained: bool) -> Options {
         let mut options = self.clone();
-        options.outputs.clear();
-        for output in &self.outputs {
-            if !options.outputs.contains(output) {
-                options.outputs.push(*output);
-            }
-        }
+        let mut seen = BTreeSet::new();
+        options.outputs.retain(|output| seen.insert(*output));
         // Contacts are constraints.
         let constrained = constrained || self.modes.is_some();
         let mut asked: Vec<Output> = options.outputs.clone();

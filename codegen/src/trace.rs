@@ -4,6 +4,8 @@
 mod derivatives;
 mod inputs;
 
+use std::collections::BTreeSet;
+
 use mbd_runtime::spatial::Motion;
 use mbd_runtime::sweep::{FrameState, Sweeps};
 use mbd_runtime::tree::row_order::early_rows;
@@ -31,13 +33,9 @@ pub fn chosen_frames(plan: &Plan, options: &Options) -> Result<Vec<usize>, Gener
         let found = plan.frames.iter().position(|f| f.name == *name);
         found.ok_or_else(|| GenerateError::UnknownFrame { name: name.clone() })
     };
-    let mut chosen = Vec::new();
-    for name in &options.frames {
-        let frame = find(name)?;
-        if !chosen.contains(&frame) {
-            chosen.push(frame);
-        }
-    }
+    let mut chosen = options.frames.iter().map(find).collect::<Result<Vec<usize>, _>>()?;
+    let mut seen = BTreeSet::new();
+    chosen.retain(|frame| seen.insert(*frame));
     Ok(chosen)
 }
 
@@ -166,11 +164,13 @@ impl<'g> Run<'_, 'g> {
         let sweeps = Sweeps { tree, trace };
         // The tree for accelerations, where another elimination is better for them.
         let other = Sweeps { tree: tree.for_accelerations(), trace };
-        let used = match output {
-            Output::Accelerations | Output::Reactions | Output::Multipliers => &other,
-            _ => &sweeps,
+        let (used, mut w) = match output {
+            Output::Accelerations | Output::Reactions | Output::Multipliers => {
+                (&other, Workspace::for_accelerations(tree))
+            }
+            _ => (&sweeps, Workspace::new(tree)),
         };
-        let w = &mut Workspace::new(used.tree);
+        let w = &mut w;
         let v = &mut vec![Expr::zero(); tree.dims.nv];
         match (output, results) {
             (Output::Rates, [qd, pd]) => sweeps.rates(q, second, u, w, v, qd, pd),

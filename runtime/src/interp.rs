@@ -128,7 +128,7 @@ impl<S: Scalar> Interpreter<S> {
 
     /// Memory for the tree for accelerations, where it is another one.
     fn other_work(tree: &Tree<S>) -> Option<Box<Workspace<S>>> {
-        tree.accelerations.as_deref().map(|other| Box::new(Workspace::new(other)))
+        tree.accelerations.is_some().then(|| Box::new(Workspace::for_accelerations(tree)))
     }
 
     /// The interpreter in which only some rows of the constraints act, with zero inputs and the gravity of this one. Its

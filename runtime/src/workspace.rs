@@ -69,11 +69,11 @@ impl<S: Scalar> NodeSteps<S> {
     /// At most so many steps represent the motion of a joint and a placement that turns.
     const MOST: usize = 4;
 
-    /// Room for the steps of the nodes of a tree.
-    fn new(tree: &Tree<S>) -> Self {
+    /// Room for the steps of the nodes of a tree, and for those of another one with as many nodes.
+    fn new(tree: &Tree<S>, other: &Tree<S>) -> Self {
         let none = ElementaryTransform::Shift { axis: crate::spatial::Axis::Z, r: S::zero() };
         let room = |tree: &Tree<S>| tree.nodes.iter().map(|node| node.place.len() + Self::MOST).sum();
-        let room = usize::max(room(tree), room(tree.for_accelerations()));
+        let room = usize::max(room(tree), room(other));
         NodeSteps { steps: vec![none; room], spans: vec![Span::default(); tree.nodes.len()] }
     }
 
@@ -307,8 +307,17 @@ pub struct Workspace<S> {
 impl<S: Scalar> Workspace<S> {
     /// Allocates memory for a tree; nothing is allocated later.
     pub fn new(tree: &Tree<S>) -> Self {
-        let n = tree.nodes.len();
-        let g = tree.unknowns.len().max(tree.for_accelerations().unknowns.len());
+        Self::beside(tree, tree)
+    }
+
+    /// Allocates memory for [`Tree::for_accelerations`], in which the tree itself has room, too: reactions take the multipliers of
+    /// the one and the bodies of the other.
+    pub fn for_accelerations(tree: &Tree<S>) -> Self {
+        Self::beside(tree.for_accelerations(), tree)
+    }
+
+    fn beside(tree: &Tree<S>, other: &Tree<S>) -> Self {
+        let (n, g) = (tree.nodes.len(), tree.unknowns.len());
         let mut first = Vec::with_capacity(n + 1);
         let mut f = 0;
         for node in &tree.nodes {
@@ -330,7 +339,7 @@ impl<S: Scalar> Workspace<S> {
         };
         Workspace {
             first,
-            poses: Poses { steps: NodeSteps::new(tree), coordinates: vec![[o; 3]; n], body: vec![upright; n] },
+            poses: Poses { steps: NodeSteps::new(tree, other), coordinates: vec![[o; 3]; n], body: vec![upright; n] },
             factor: Factor {
                 m: vec![ArticulatedInertia::zero(); n],
                 pivots: vec![pivot; f],
