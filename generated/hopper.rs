@@ -2380,6 +2380,11 @@ impl ::multibody::runtime::contact::Touching for Hopper {
     }
 
     #[inline]
+    fn moves_at_rest(&self) -> bool {
+        false
+    }
+
+    #[inline]
     fn act(&mut self, modes: &[::multibody::runtime::contact::Mode]) {
         for (contact, mode) in self.contacts.iter().zip(modes) {
             for k in 0..contact.rows() {

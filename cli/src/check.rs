@@ -6,6 +6,7 @@ use std::path::Path;
 
 use multibody::codegen::model::{ConstraintKind, Model, Value};
 use multibody::codegen::options::PlanOptions;
+use multibody::codegen::singular::dependent_velocity;
 use multibody::codegen::words;
 use multibody::runtime::tree::Source;
 
@@ -67,6 +68,14 @@ fn counted_constraints(model: &Model) -> (Option<String>, Option<String>) {
 fn summary(path: &Path, name: &str, model: &Model, out: &mut dyn Write) -> Outcome {
     let plan = source::planned(model, PlanOptions::default()).plan;
     source::tell_notices(path, &plan.notices);
+    if let Some(name) = dependent_velocity(&plan) {
+        let what = format!(
+            "the mass matrix is singular in every state: no inertia resists `{name}` while the velocities before it may follow"
+        );
+        let help =
+            format!("give what `{name}` moves mass and inertia, give its joint an `armature`, or make it `fixed`");
+        return Err(Failure::new(what, help));
+    }
     let params = plan.default_params();
     let closed = match model.constraints.is_empty() {
         true => None,

@@ -35,6 +35,7 @@ pub mod rolled;
 mod rounded_once;
 mod sample;
 pub mod search;
+pub mod singular;
 pub mod symbolic;
 mod symmetric;
 mod trace;

@@ -226,6 +226,9 @@ impl Reducible for Evaluator {
     fn trees(&self) -> Vec<usize> {
         self.interpreter.tree().trees()
     }
+    fn moves_at_rest(&self) -> bool {
+        self.interpreter.moves_at_rest()
+    }
     fn with_implicit_springs(&self, step: f64) -> Option<ImplicitSprings<Self, Vec<f64>>> {
         let found = self.interpreter.with_implicit_springs(step)?;
         let code = self.code.implicit.get_or_init(|| Code::new(self.code.plan.with_implicit_springs())).clone();

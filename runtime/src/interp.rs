@@ -152,6 +152,11 @@ impl<S: Scalar> Interpreter<S> {
         swap(&mut self.gravity, &mut other.gravity);
     }
 
+    /// Whether bodies may move without momenta: by prescribed joints, or by loops that follow these.
+    pub fn moves_at_rest(&self) -> bool {
+        self.tree.dims.drive_v > 0 || !self.tree.constraints.is_empty()
+    }
+
     /// Residuals of all rows of the constraints, their velocities `Φ v` with what prescribed motions add, one number for
     /// each row, and the entries of `Φ`: `(q, v) → (φ, Φ v, Φ)`.
     pub fn gaps(&mut self, q: &[S], v: &[S], gaps: &mut [S], velocities: &mut [S], entries: &mut [S]) {
@@ -374,7 +379,7 @@ impl<S: Real> Interpreter<S> {
         let made = Self::new(self.physical.clone().with_implicit_springs(step), self.gravity);
         let (rows, entry_columns) = (self.rows.clone(), self.entry_columns.clone());
         let evaluator = Interpreter { rows, entry_columns, names: self.names.clone(), ..made };
-        let driven = self.tree.dims.drive_v > 0 || !self.tree.constraints.is_empty();
+        let driven = self.moves_at_rest();
         let (added, stiffness) = (self.physical.implicit_inertias(step), self.physical.stiffnesses());
         Some(ImplicitSprings { evaluator, added, stiffness, driven })
     }

@@ -195,6 +195,9 @@ impl Reducible for Driven {
     fn trees(&self) -> Vec<usize> {
         self.inner.trees()
     }
+    fn moves_at_rest(&self) -> bool {
+        self.inner.moves_at_rest()
+    }
     fn gaps(
         &mut self,
         q: &Vec<f64>,

@@ -38,6 +38,55 @@ fn check_tells_what_is_sound() {
     assert!(out(&floating).contains("nq 19, nv 18"), "{}", out(&floating));
 }
 
+/// Freedoms without inertia that no body alone shows: the leader of a mimic joint with nothing heavy on either, two joints that
+/// slide one body along one line, a base without mass that turns about the joint of the only body that it carries.
+#[test]
+fn check_tells_of_mass_matrices_that_are_singular_everywhere() {
+    let folder = folder("singular");
+    let file = |name: &str, text: &str| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let body = |name: &str| format!("[[body]]\nname = \"{name}\"\n");
+    let heavy = "mass = 1\ninertia = [1, 1, 1]\n";
+    let joint = |name: &str, kind: &str, parent: &str, child: &str, more: &str| {
+        let parent = if parent.is_empty() { String::new() } else { format!("parent = \"{parent}\"\n") };
+        let axis = if kind == "floating" { "" } else { "axis = [0, 0, 1]\n" };
+        format!("[[joint]]\nname = \"{name}\"\ntype = \"{kind}\"\n{parent}child = \"{child}\"\n{axis}{more}")
+    };
+    let mimic = [
+        body("base") + heavy,
+        joint("turn", "revolute", "", "base", ""),
+        body("left"),
+        joint("lead", "revolute", "base", "left", ""),
+        body("right"),
+        joint("follow", "revolute", "base", "right", "mimic = { joint = \"lead\" }\n"),
+    ]
+    .concat();
+    let slides = [
+        body("light"),
+        joint("first", "prismatic", "", "light", ""),
+        body("heavy") + heavy,
+        joint("second", "prismatic", "light", "heavy", ""),
+    ]
+    .concat();
+    let base = [
+        body("light"),
+        joint("motion", "floating", "", "light", ""),
+        body("heavy") + heavy,
+        joint("hinge", "revolute", "light", "heavy", ""),
+    ]
+    .concat();
+    for (name, text, velocity) in [("mimic", mimic, "lead"), ("slides", slides, "second"), ("base", base, "hinge")] {
+        let path = file(&format!("{name}.toml"), &format!("name = \"{name}\"\n{text}"));
+        bad(
+            run(&["check", &path]),
+            &["the mass matrix is singular in every state", &format!("`{velocity}`"), "armature"],
+        );
+    }
+}
+
 #[test]
 fn variants_are_checked_and_chosen() {
     let model = "models/variants/chain.toml";

@@ -199,6 +199,10 @@ impl<'a> Contacts<'a> {
                 },
             ),
             method(
+                "moves_at_rest(&self) -> bool",
+                if plan.dims.drive_v > 0 || self.rows > rows { "true" } else { "false" },
+            ),
+            method(
                 &format!("act(&mut self, modes: &[{rt}::contact::Mode])"),
                 &format!(
                     "for (contact, mode) in self.contacts.iter().zip(modes) {{\n            for k in 0..contact.rows() \

@@ -536,6 +536,10 @@ impl<S: Number> Reducible for Compiled<S> {
         self.interpreter.tree().trees()
     }
 
+    fn moves_at_rest(&self) -> bool {
+        self.interpreter.moves_at_rest()
+    }
+
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
         if !self.run(Output::Gaps, [q, v, &[]], [gaps, velocities, entries]) {
             self.interpreting().gaps(q, v, gaps, velocities, entries);

@@ -3,7 +3,7 @@
 use super::touching::{add_row, along_row};
 use super::{Contact, Mode, Touch, Touching, WithContacts};
 use crate::constrained::rows::row;
-use crate::lists::{copy, get, part, set};
+use crate::lists::{copy, get, part, set, split};
 use crate::system::{Real, Row};
 use crate::Scalar;
 #[cfg(feature = "alloc")]
@@ -47,9 +47,9 @@ pub(super) fn lines<'a, S: Real>(all: &'a [Contact<S>], of: Forces<'a, S>) -> im
     })
 }
 
-/// Momenta `p` at one state whose velocities are wanted, `M v = p`: column 0 is `p = 0`, whose velocities come from prescribed
-/// motions alone; column `i + 1` is `Φᵀ` times a unit force at line `i` of the contacts. The velocities become the
-/// inverse inertia of the contacts. [`Touching::project_columns`] takes them.
+/// Momenta `p` at one state whose velocities are wanted, `M v = p`: columns are `Φᵀ` times a unit force at each line of the
+/// contacts, after one of `p = 0` where bodies move without momenta ([`Touching::moves_at_rest`]). The velocities become
+/// the inverse inertia of the contacts. [`Touching::project_columns`] takes them.
 #[derive(Debug)]
 pub struct Columns<'a, S> {
     of: Forces<'a, S>,
@@ -57,8 +57,10 @@ pub struct Columns<'a, S> {
     entries: &'a [S],
     a: &'a mut [S],
     own: &'a mut [S],
-    /// Velocities of the first column.
+    /// Velocities without momenta.
     rest: &'a mut [S],
+    /// Number of columns before those of the lines: one whose velocities are those without momenta, or none.
+    ahead: usize,
 }
 
 /// [`Columns`] of a mechanism.
@@ -70,6 +72,8 @@ pub struct ColumnsOf<'a, 'b, S> {
     /// Columns of the entries.
     places: &'a [usize],
     shared: Shared<'a>,
+    /// Number of lines.
+    lines: usize,
 }
 
 /// Which lines are solved for together: forces on trees that stand on the ground beside each other do not feel one another.
@@ -106,7 +110,8 @@ impl<'b, S: Real> Columns<'b, S> {
         places: &'a [usize],
         shared: Shared<'a>,
     ) -> ColumnsOf<'a, 'b, S> {
-        ColumnsOf { columns: self, contacts, rows, places, shared }
+        let lines = lines(contacts, self.of).count();
+        ColumnsOf { columns: self, contacts, rows, places, shared, lines }
     }
 
     /// Gives each line the first column that no line before it has whose force acts on the same trees; contacts act on those in
@@ -136,43 +141,44 @@ impl<'b, S: Real> Columns<'b, S> {
 impl<S: Real> ColumnsOf<'_, '_, S> {
     /// Their number.
     pub fn count(&self) -> usize {
-        let apart = || lines(self.contacts, self.columns.of).count();
-        1 + self.shared.lines.iter().map(|line| line.column + 1).max().unwrap_or_else(apart)
+        self.columns.ahead + self.shared.lines.iter().map(|line| line.column + 1).max().unwrap_or(self.lines)
     }
 
     /// Writes the momenta of `L` columns from column `i` on, side by side: `L` numbers for each velocity, zeros after the last.
     pub fn momenta<const L: usize>(&self, i: usize, p: &mut [S]) {
         p.fill(S::zero());
         let places = Places { rows: self.rows, columns: self.places, entries: self.columns.entries };
+        let ahead = self.columns.ahead;
         if self.shared.any() {
             for (line, solved) in lines(self.contacts, self.columns.of).zip(self.shared.lines) {
-                if let Some(lane) = (solved.column + 1).checked_sub(i).filter(|lane| *lane < L) {
+                if let Some(lane) = (solved.column + ahead).checked_sub(i).filter(|lane| *lane < L) {
                     places.unit_force::<L>(line, lane, p);
                 }
             }
             return;
         }
-        // The first column is zero.
-        for (line, lane) in lines(self.contacts, self.columns.of).skip(i.max(1) - 1).zip(usize::from(i == 0)..L) {
+        // What is ahead of the lines stays zero.
+        for (line, lane) in lines(self.contacts, self.columns.of).skip(i.max(ahead) - ahead).zip(ahead.max(i) - i..L) {
             places.unit_force::<L>(line, lane, p);
         }
     }
 
-    /// Takes the velocities of `L` columns from column `i` on, which come side by side, after those of the first one; they are
-    /// changed.
+    /// Takes the velocities of `L` columns from column `i` on, which come side by side, after those of the columns before;
+    /// they are changed.
     pub fn take<const L: usize>(&mut self, i: usize, v: &mut [S]) {
-        let ColumnsOf { rows, places, contacts, shared, columns: Columns { of, entries, a, own, rest } } = self;
+        let ColumnsOf { rows, places, contacts, shared, columns, lines: count } = self;
+        let Columns { of, entries, a, own, rest, ahead } = columns;
+        let ahead = *ahead;
         let places = Places { rows, columns: places, entries };
-        if i == 0 {
+        if i < ahead {
             for (rest, v) in rest.iter_mut().zip(v.chunks_exact(L)) {
                 *rest = get(v, 0);
             }
         }
         if shared.any() {
-            return places.take_shared::<L>(i, *shared, lines(contacts, *of), (rest, v), (a, own));
+            return places.take_shared::<L>((i, ahead), *shared, lines(contacts, *of), (rest, v), (a, own));
         }
-        let count = lines(contacts, *of).count();
-        places.take_answers::<L>((i, count), lines(contacts, *of), (rest, v), (a, own));
+        places.take_answers::<L>((i, ahead, *count), lines(contacts, *of), (rest, v), (a, own));
     }
 }
 
@@ -197,21 +203,23 @@ impl<'a, S: Real> Places<'a, S> {
         }
     }
 
-    /// Takes the velocities that `L` columns from column `i` on answer with, beyond those at rest, into `a` and `own`: column 0
-    /// is that at rest, those of `count` lines follow.
+    /// Takes the velocities that `L` columns from column `i` on answer with, beyond those at rest, into `a` and `own`: those of
+    /// `count` lines follow on those `ahead`.
     #[inline(always)]
     fn take_answers<const L: usize>(
         self,
-        (i, count): (usize, usize),
+        (i, ahead, count): (usize, usize, usize),
         all: impl Iterator<Item = Line<S>>,
         (rest, v): (&[S], &mut [S]),
         (a, own): (&mut [S], &mut [S]),
     ) {
-        if i + L <= 1 {
+        if i + L <= ahead {
             return;
         }
-        for (v, rest) in v.chunks_exact_mut(L).zip(rest) {
-            v.iter_mut().for_each(|v| *v = *v - *rest);
+        if ahead > 0 {
+            for (v, rest) in v.chunks_exact_mut(L).zip(rest) {
+                v.iter_mut().for_each(|v| *v = *v - *rest);
+            }
         }
         let along = |r: usize| {
             let mut sums = [S::zero(); L];
@@ -222,13 +230,16 @@ impl<'a, S: Real> Places<'a, S> {
             }
             sums
         };
-        let from = usize::from(i == 0);
+        let from = ahead.max(i) - i;
         for (k, (line, a)) in all.zip(a.chunks_exact_mut(count.max(1))).enumerate() {
             let answers = along(line.row);
-            for (a, answer) in a.iter_mut().skip(i + from - 1).zip(answers.iter().skip(from)) {
-                *a = *answer;
+            let (_, to) = split(a, i + from - ahead);
+            match to.first_chunk_mut::<L>() {
+                // A length that the compiler knows is copied without a call.
+                Some(to) if from == 0 => *to = answers,
+                _ => copy(to, answers.get(from..).unwrap_or_default()),
             }
-            let lane = (k + 1).wrapping_sub(i);
+            let lane = (k + ahead).wrapping_sub(i);
             if let (true, Some(own)) = (lane < L, own.get_mut(k)) {
                 *own = line.forces(S::one()).fold(S::zero(), |sum, (r, force)| sum + force * get(&along(r), lane));
             }
@@ -238,7 +249,7 @@ impl<'a, S: Real> Places<'a, S> {
     /// [`Places::take_answers`] where lines share columns. A row feels of a line what goes through the trees on which it acts.
     fn take_shared<const L: usize>(
         self,
-        i: usize,
+        (i, ahead): (usize, usize),
         shared: Shared,
         all: impl Iterator<Item = Line<S>>,
         (rest, v): (&[S], &[S]),
@@ -251,7 +262,7 @@ impl<'a, S: Real> Places<'a, S> {
                 sum + *entry * (get(v, *column * L + lane) - get(rest, *column))
             })
         };
-        let lane = |solved: &Solved| (solved.column + 1).checked_sub(i).filter(|lane| *lane < L);
+        let lane = |solved: &Solved| (solved.column + ahead).checked_sub(i).filter(|lane| *lane < L);
         let count = shared.lines.len();
         for (k, ((line, to), a)) in all.zip(shared.lines).zip(a.chunks_exact_mut(count.max(1))).enumerate() {
             for (a, solved) in a.iter_mut().zip(shared.lines) {
@@ -276,7 +287,7 @@ impl<'a, S: Real> Places<'a, S> {
 impl<Y: Touching> WithContacts<Y> {
     /// Opens all contacts until [`WithContacts::restore`]; computes the velocities of the rows of [`lines`], in columns of
     /// the square `a`, for a unit force of each line: the inverse inertia of the contacts, if these are all their rows.
-    /// One solve for each line, and one for the velocities of prescribed motions, to which forces add theirs; several at
+    /// One solve for each line, and one for the velocities without momenta, to which forces add theirs; several at
     /// once where the mechanism can. The velocities along the lines themselves, friction included, go to `own`, which may
     /// be empty. `open` has [`Mode::Open`] for each contact. With `implicit`, springs and dampers of the joints follow:
     /// [`Touching::project_columns_implicitly`]. After [`WithContacts::look`].
@@ -290,7 +301,12 @@ impl<Y: Touching> WithContacts<Y> {
     ) {
         self.borrow_modes(open);
         let WithContacts { system, at, unit: rest, response, response_v, sigma, .. } = self;
-        let mut columns = Columns { of, entries: at.entries.as_ref(), a, own, rest: rest.as_mut() };
+        let moves = system.moves_at_rest();
+        if !moves {
+            rest.as_mut().fill(Y::Scalar::zero());
+        }
+        let ahead = usize::from(moves);
+        let mut columns = Columns { of, entries: at.entries.as_ref(), a, own, rest: rest.as_mut(), ahead };
         if implicit {
             return system.project_columns_implicitly(t, q, &mut columns);
         }
@@ -299,9 +315,11 @@ impl<Y: Touching> WithContacts<Y> {
         }
         // One after the other, without what the mechanism would have to be asked for: firmware knows its rows.
         let Columns { a, own, rest, .. } = columns;
-        response.as_mut().fill(Y::Scalar::zero());
-        system.project_momenta(t, q, response, response_v, sigma);
-        copy(rest, response_v.as_ref());
+        if moves {
+            response.as_mut().fill(Y::Scalar::zero());
+            system.project_momenta(t, q, response, response_v, sigma);
+            copy(rest, response_v.as_ref());
+        }
         let count = lines(system.contacts(), of).count();
         for i in 0..count {
             let Some(line) = lines(system.contacts(), of).nth(i) else { return };
@@ -311,7 +329,7 @@ impl<Y: Touching> WithContacts<Y> {
             system.project_momenta(t, q, response, response_v, sigma);
             let places = Places { rows: system.rows(), columns: system.entry_columns(), entries: at.entries.as_ref() };
             places.take_answers::<1>(
-                (i + 1, count),
+                (i, 0, count),
                 lines(system.contacts(), of),
                 (rest, response_v.as_mut()),
                 (a, own),
@@ -338,7 +356,7 @@ impl<Y: Touching> WithContacts<Y> {
         }
     }
 
-    /// Velocities of the momenta `self.response` beyond those of prescribed motions, after [`WithContacts::responses`].
+    /// Velocities of the momenta `self.response` beyond those without momenta, after [`WithContacts::responses`].
     fn answer_from_rest(&mut self, t: Y::Scalar, q: &Y::Coordinates) {
         self.answer(t, q);
         for (v, rest) in self.response_v.as_mut().iter_mut().zip(self.unit.as_ref()) {
@@ -353,8 +371,9 @@ impl<Y: Touching> WithContacts<Y> {
         add_impulses(system, &at.entries, contacts, impulses, p);
     }
 
-    /// What the impulses of some contacts change velocities by, in `self.response_v`; with `implicit`, where springs and
-    /// dampers of the joints follow ([`Touching::project_implicitly`]), with the change of the momenta in `self.response`.
+    /// What the impulses of some contacts change velocities by, in `self.response_v`, after [`WithContacts::responses`] at
+    /// the state; with `implicit`, where springs and dampers of the joints follow ([`Touching::project_implicitly`]), with
+    /// the change of the momenta in `self.response`.
     pub(super) fn respond_to_impulses(
         &mut self,
         (t, q): (Y::Scalar, &Y::Coordinates),
@@ -362,12 +381,8 @@ impl<Y: Touching> WithContacts<Y> {
         impulses: &[Y::Scalar],
         implicit: bool,
     ) {
-        let WithContacts { system, at, response, response_v, unit: rest, sigma, .. } = self;
+        let WithContacts { system, at, response, response_v, .. } = self;
         response.as_mut().fill(Y::Scalar::zero());
-        if !implicit {
-            system.project_momenta(t, q, response, rest, sigma);
-            response.as_mut().fill(Y::Scalar::zero());
-        }
         add_impulses(system, &at.entries, contacts, impulses, response);
         if implicit {
             system.project_implicitly(t, q, response, response_v);

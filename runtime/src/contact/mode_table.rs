@@ -44,6 +44,11 @@ pub trait Reducible: Constrained<Scalar: Real> + Energetic + Conjugate + Sized {
         Vec::new()
     }
 
+    /// [`Touching::moves_at_rest`].
+    fn moves_at_rest(&self) -> bool {
+        true
+    }
+
     /// Whether [`Reducible::gaps_of`] takes less than [`Reducible::gaps`] where few rows are asked for.
     fn sees_parts(&self) -> bool {
         false
@@ -102,6 +107,10 @@ impl<S: Real> Reducible for Interpreter<S> {
 
     fn gaps(&mut self, q: &Vec<S>, v: &Vec<S>, gaps: &mut Vec<S>, velocities: &mut Vec<S>, entries: &mut Vec<S>) {
         Interpreter::gaps(self, q, v, gaps, velocities, entries);
+    }
+
+    fn moves_at_rest(&self) -> bool {
+        Interpreter::moves_at_rest(self)
     }
 
     fn sees_parts(&self) -> bool {
@@ -406,6 +415,10 @@ impl<Y: Reducible> Touching for ModeTable<Y> {
         self.full.swap_inputs(current);
         self.full.gaps(q, v, gaps, velocities, entries);
         self.full.swap_inputs(current);
+    }
+
+    fn moves_at_rest(&self) -> bool {
+        Reducible::moves_at_rest(&**self)
     }
 
     fn sees_parts(&self) -> bool {

@@ -62,6 +62,10 @@ pub trait Touching: Constrained<Scalar: Real> {
         velocities: &mut Self::Rows,
         entries: &mut Self::Entries,
     );
+    /// Whether bodies may move without momenta: by prescribed joints, or by loops that follow these.
+    fn moves_at_rest(&self) -> bool {
+        true
+    }
     /// Whether [`Touching::gaps_of`] takes less than [`Touching::gaps`] where few contacts are asked for.
     fn sees_parts(&self) -> bool {
         false

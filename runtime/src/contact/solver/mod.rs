@@ -339,7 +339,9 @@ fn fits<S: Real>(problem: &Problem<S>, impulses: &[S], work: &[S]) -> Result<(),
 
 /// Tells of numbers that are not finite.
 fn finite<S: Real>(problem: &Problem<S>) -> Result<(), ContactError> {
-    match problem.a.iter().chain(problem.b).all(|x| x.is_finite()) {
+    // Without an early end, which would keep the compiler from looking at several numbers at once.
+    let all = |list: &[S]| list.iter().fold(true, |all, x| all & x.is_finite());
+    match all(problem.a) & all(problem.b) {
         true => Ok(()),
         false => Err(ContactError::NotFinite),
     }

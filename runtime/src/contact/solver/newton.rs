@@ -14,20 +14,25 @@ const PROXIMAL: f64 = 1e-10;
 pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], work: &mut [S]) -> bool {
     let n = impulses.len();
     let (v, rest) = split(work, n);
+    // The mass that each contact moves, at its normal row, if it acts; less than zero otherwise.
     let (acts, rest) = split(rest, n);
     let (step, rest) = split(rest, n);
     let (exchanged, matrix) = split(rest, n);
-    let mut count = 0;
+    // Number of rows that act, and whether they are the first ones, in order.
+    let (mut count, mut in_order) = (0, true);
     for touch in terms.problem.touches {
         let c = touch.contact;
-        let acting = touch.slip.is_some() || get(terms.least, c.row) > S::zero() || pressed(terms, touch, impulses, v);
-        set(acts, c.row, if acting { S::one() } else { S::zero() });
+        let (mass, least) = (cone::mass(terms.problem, touch), get(terms.least, c.row));
+        // What presses bodies together by more than the least impulse acts, and so does what has one, or slides.
+        let pressed = || get(impulses, c.row) - mass * get(v, c.row) > least;
+        let acting = touch.slip.is_some() || least > S::zero() || pressed();
+        set(acts, c.row, if acting { mass } else { -S::one() });
         if acting {
+            in_order &= c.row == count;
             count += c.rows();
             continue;
         }
         // Nothing but these impulses changes, so that the others' velocities can follow at once.
-        let least = get(terms.least, c.row);
         for k in 0..c.rows() {
             let (row, to) = (c.row + k, if k == 0 { least } else { S::zero() });
             let change = to - get(impulses, row);
@@ -40,13 +45,14 @@ pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], work: &mut [S]
         }
     }
     let (matrix, step) = (first_mut(matrix, count * count), first_mut(step, count));
-    let acting = |touch: &&Touch<S>| get(acts, touch.contact.row) > S::zero();
+    let acting = |touch: &&Touch<S>| get(acts, touch.contact.row) >= S::zero();
     let mut at = 0;
     for touch in terms.problem.touches.iter().filter(acting) {
         let rows = touch.contact.rows();
         let (lines, rhs) = (part_mut(matrix, at * count, rows * count), part_mut(step, at, rows));
         let all = terms.problem.touches.iter().filter(acting);
-        equations(terms, (touch, at), all, (impulses, v), lines, rhs);
+        let mass = get(acts, touch.contact.row);
+        equations(terms, (touch, mass, at), (all, in_order), (impulses, v), lines, rhs);
         at += rows;
     }
     let exchanged = first_mut(exchanged, count);
@@ -63,19 +69,12 @@ pub(super) fn step<S: Real>(terms: &Terms<S>, impulses: &mut [S], work: &mut [S]
     true
 }
 
-/// Whether a contact presses bodies together by more than the least impulse.
-fn pressed<S: Real>(terms: &Terms<S>, touch: &Touch<S>, impulses: &[S], v: &[S]) -> bool {
-    let row = touch.contact.row;
-    let p = get(impulses, row);
-    p - cone::mass(terms.problem, touch) * get(v, row) > get(terms.least, row)
-}
-
-/// The equations of a contact, `F(P) = 0`, in `rhs`, and their derivatives by the impulses of the contacts that act, in `lines`;
-/// its own begin `at` a place.
+/// The equations of a contact that moves a mass, `F(P) = 0`, in `rhs`, and their derivatives by the impulses of `all` contacts
+/// that act, in `lines`; its own begin `at` a place. `in_order`: the rows that act are the first ones of the problem.
 fn equations<'a, S: Real + 'a>(
     terms: &Terms<S>,
-    (touch, at): (&Touch<S>, usize),
-    all: impl Iterator<Item = &'a Touch<S>>,
+    (touch, mass, at): (&Touch<S>, S, usize),
+    (all, in_order): (impl Iterator<Item = &'a Touch<S>> + Clone, bool),
     (impulses, v): (&[S], &[S]),
     lines: &mut [S],
     rhs: &mut [S],
@@ -84,7 +83,7 @@ fn equations<'a, S: Real + 'a>(
     let problem = terms.problem;
     let (n, c) = (problem.b.len(), touch.contact);
     let count = (lines.len() / c.rows()).max(1);
-    let (row, mass, more) = (c.row, cone::mass(problem, touch), terms.proximal(touch));
+    let (row, more) = (c.row, if terms.alpha > zero { terms.proximal(touch) } else { zero });
     let (least, friction) = (get(terms.least, row), c.friction);
     let prox = S::constant(PROXIMAL);
     let p: [S; 3] = core::array::from_fn(|i| if i < c.rows() { get(impulses, row + i) } else { zero });
@@ -130,15 +129,26 @@ fn equations<'a, S: Real + 'a>(
             }
         }
     }
-    let mut column = 0;
-    for other in all {
-        for j in other.contact.row..other.contact.row + other.contact.rows() {
-            let a: [S; 3] =
-                core::array::from_fn(|i| if i < c.rows() { get(problem.a, (row + i) * n + j) } else { zero });
-            for (line, from) in lines.chunks_exact_mut(count).zip(&from) {
-                set(line, column, from[0] * a[0] + from[1] * a[1] + from[2] * a[2]);
+    for (line, from) in lines.chunks_exact_mut(count).zip(&from) {
+        line.fill(zero);
+        for (k, from) in from.iter().enumerate() {
+            // Of most contacts, lines are those of `A` itself.
+            if *from == zero && from.derivative().is_none() {
+                continue;
             }
-            column += 1;
+            let a = part(problem.a, (row + k) * n, n);
+            if in_order {
+                line.iter_mut().zip(a).for_each(|(x, a)| *x = *x + *from * *a);
+                continue;
+            }
+            let mut rest = &mut *line;
+            for other in all.clone() {
+                let (own, others) = split(rest, other.contact.rows());
+                for (x, a) in own.iter_mut().zip(part(a, other.contact.row, other.contact.rows())) {
+                    *x = *x + *from * *a;
+                }
+                rest = others;
+            }
         }
     }
     for (i, line) in lines.chunks_exact_mut(count).enumerate() {

@@ -168,6 +168,7 @@ fn elsewhere<S: Real>(
                 set(impulses, row, (random() - S::constant(0.5)) * c.friction * normal);
             }
         }
+        velocities(terms, impulses, first_mut(work, impulses.len()));
         let found = improve(terms, tolerance, (FAR, 1), impulses, progress, work);
         let worst = progress.worst;
         if worst.1.is_finite() && least.is_none_or(|least| worst.1 < least.1) {
@@ -182,7 +183,8 @@ fn elsewhere<S: Real>(
 }
 
 /// Steps of Newton's method, until the residual is below a tolerance; whether it is. With several `lengths`, until a step does
-/// not reduce it either, which is not made; with one, all are full steps. `work` has room for a square matrix and five lists.
+/// not reduce it either, which is not made; with one, all are full steps. `work` begins with the velocities of the impulses, as
+/// [`Progress::reaches`] leaves them, and has room for a square matrix and five lists.
 pub(super) fn improve<S: Real>(
     terms: &Terms<S>,
     tolerance: f64,
@@ -192,7 +194,7 @@ pub(super) fn improve<S: Real>(
     work: &mut [S],
 ) -> bool {
     let (last, work) = split(work, impulses.len());
-    velocities(terms, impulses, first_mut(work, impulses.len()));
+    copy(first_mut(work, impulses.len()), last);
     for _ in 0..steps {
         copy(last, impulses);
         let before = progress.worst;
