@@ -218,8 +218,14 @@ where
     Y: Unconstrained,
     Y::Scalar: Real,
 {
+    const KEEPS_GUESS: bool = true;
+
     fn order(&self) -> u32 {
         RADAU5.order
+    }
+
+    fn begin(&mut self) {
+        self.lambda.iter_mut().for_each(|lambda| lambda.as_mut().fill(Y::Scalar::zero()));
     }
 
     fn attempt(

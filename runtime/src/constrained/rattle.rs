@@ -225,8 +225,14 @@ where
     Y: Unconstrained,
     Y::Scalar: Real,
 {
+    const KEEPS_GUESS: bool = true;
+
     fn order(&self) -> u32 {
         2
+    }
+
+    fn begin(&mut self) {
+        self.lambda.as_mut().fill(Y::Scalar::zero());
     }
 
     fn attempt(

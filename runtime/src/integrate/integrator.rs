@@ -92,6 +92,9 @@ where
     /// Whether the rate at the end of a step is always evaluated when the step is accepted, for the next one to start
     /// with.
     const ENDS_WITH_RATE: bool = false;
+    /// Whether the equations of a step are solved from what the last step found. As a history, it is kept as long as each
+    /// step starts from the state that the method returned last.
+    const KEEPS_GUESS: bool = false;
 
     /// Order of convergence.
     fn order(&self) -> u32;
@@ -106,7 +109,7 @@ where
         1.0
     }
 
-    /// Discards past steps; the next step starts from a new state.
+    /// Discards past steps; the next step starts from a new state. Without history or guess, that is every step.
     fn begin(&mut self) {}
 
     /// Computes the displacement `step.delta` of a step of `h` s from time `t` (s), and its error as
@@ -244,7 +247,10 @@ where
     }
 
     fn resume(&mut self, system: &mut Y, t: Y::Scalar, q: &Y::Coordinates, p: &Y::Momenta) -> Result<(), StepError> {
-        if S::MULTISTEP && self.step.field.holds(system, q, p) {
+        if (S::MULTISTEP || S::KEEPS_GUESS) && self.step.field.holds(system, q, p) {
+            if !S::MULTISTEP {
+                (self.step.start_known, self.step.end_known) = (false, false);
+            }
             return self.step.field.load(system, t, q, p);
         }
         self.begin(system, t, q, p)
@@ -330,13 +336,11 @@ where
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,
     ) -> Result<(), StepError> {
+        self.resume(system, t, q, p)?;
+        self.attempt(system, t, h, None)?;
         if S::MULTISTEP {
-            self.resume(system, t, q, p)?;
-            self.attempt(system, t, h, None)?;
             self.accept(system, t, h)?;
         } else {
-            self.begin(system, t, q, p)?;
-            self.attempt(system, t, h, None)?;
             self.step.field.advance(system, t, &self.step.delta)?;
         }
         self.step.field.store(system, q, p);

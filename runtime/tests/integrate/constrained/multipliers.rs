@@ -3,7 +3,7 @@
 use super::holding::{apart, held, march, State};
 use super::systems::*;
 use mbd_runtime::constrained::{OpenAndClosed, RadauIndex2, Rattle, Stabilisation};
-use mbd_runtime::integrate::{Stepper, Verner9};
+use mbd_runtime::integrate::{Solver, Step, Stepper, Verner9};
 
 fn split<T: Model + Clone>(model: T) -> OpenAndClosed<Open<T>, Closed<T>> {
     OpenAndClosed { open: Open(model.clone()), closed: Closed::new(model) }
@@ -144,4 +144,58 @@ fn radau_has_order_five() {
     });
     println!("{errors:?}");
     assert!((errors[0] / errors[1]).log2() > 4.5, "{errors:?}");
+}
+
+/// A step begins with the multipliers of the last one, which saves iterations. A motion does not begin with those of the
+/// motion before: it has the bits of one by a new method, and takes as many iterations.
+#[test]
+fn multipliers_go_from_step_to_step_and_not_from_motion_to_motion() {
+    type Y = OpenAndClosed<Open<Sticks>, Closed<Sticks>>;
+    fn check<M: Stepper<Y>>(name: &str, make: impl Fn(&Y) -> M) {
+        let mut y = split(Sticks::double());
+        let rest: State = (vec![0.8, -0.6, 1.4, 0.2], vec![0.0; 4]);
+        // Both masses turn about the origin with 20 rad/s; the forces of the sticks are some forty times those at rest.
+        let turning: State = (rest.0.clone(), vec![12.0, 16.0, -4.0, 28.0]);
+        let (steps, end) = (5, 0.05);
+        let mut new = make(&y);
+        let expected = march(&mut y, &mut new, steps, end, &rest).unwrap();
+        let iterations = new.statistics().iterations;
+
+        let mut used = make(&y);
+        march(&mut y, &mut used, steps, end, &turning).unwrap();
+        let before = used.statistics().iterations;
+        assert_eq!(march(&mut y, &mut used, steps, end, &rest).unwrap(), expected, "{name}");
+        assert_eq!(used.statistics().iterations - before, iterations, "{name}");
+
+        // The same of solvers, which keep the state themselves.
+        let step = Step::Fixed(end / f64::from(steps));
+        let method = make(&y);
+        let mut new = Solver::new(&mut y, method, step, 0.0, &rest.0, &rest.1).unwrap();
+        let method = make(&y);
+        let mut used = Solver::new(&mut y, method, step, 0.0, &turning.0, &turning.1).unwrap();
+        used.run(&mut y, end).unwrap();
+        let before = used.statistics().iterations;
+        used.restart(&mut y, 0.0, &rest.0, &rest.1).unwrap();
+        let [expected, found] = [&mut new, &mut used].map(|solver| {
+            solver.run(&mut y, end).unwrap();
+            let (mut q, mut p) = rest.clone();
+            solver.state(&y, &mut q, &mut p);
+            (q, p)
+        });
+        assert_eq!(found, expected, "{name}");
+        assert_eq!(used.statistics().iterations - before, iterations, "{name}");
+        assert_eq!(new.statistics().iterations, iterations, "{name}");
+
+        let ((mut q, mut p), mut forgetful) = (rest, 0);
+        for _ in 0..steps {
+            let mut method = make(&y);
+            method.step(&mut y, 0.0, end / f64::from(steps), &mut q, &mut p).unwrap();
+            forgetful += method.statistics().iterations;
+        }
+        println!("{name}: {iterations} iterations, {forgetful} without multipliers of the last step");
+        assert!(iterations < forgetful, "{name}: {iterations} {forgetful}");
+    }
+    check("rattle", Rattle::new);
+    check("radau", RadauIndex2::new);
+    check("radau held", |y| held(y, RadauIndex2::new(y), Stabilisation::Mass));
 }
