@@ -1,8 +1,8 @@
 //! Measures of errors of lists. Differences are infinite where a number is not finite, over which a maximum passes.
 
-/// The largest absolute value, at least `least`.
+/// The largest absolute value, at least `least`; NaN where a number is NaN.
 pub fn largest(list: &[f64], least: f64) -> f64 {
-    list.iter().fold(least, |most, x| most.max(x.abs()))
+    list.iter().map(|x| x.abs()).fold(least, |most, x| if x.total_cmp(&most).is_gt() { x } else { most })
 }
 
 /// The largest difference of two lists; infinite where a number of either is not finite.

@@ -33,7 +33,7 @@ fn a_refused_state_leaves_nothing_behind() {
     let (mut fresh_q, mut fresh_p) = (q.clone(), p.clone());
     method.step(&mut y, 0.1, 0.1, &mut q, &mut p).unwrap();
     Rk4::new(&y).step(&mut y, 0.1, 0.1, &mut fresh_q, &mut fresh_p).unwrap();
-    let off = q.iter().chain(&p).zip(fresh_q.iter().chain(&fresh_p)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let off = largest_difference(&[q, p].concat(), &[fresh_q, fresh_p].concat());
     assert!(off < 1e-14, "{off:e}");
 }
 

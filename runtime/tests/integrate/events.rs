@@ -76,7 +76,7 @@ fn a_pendulum_by_its_quarter_periods() {
             expected.iter().map(|e| e.0).collect::<Vec<_>>(),
             "{name}"
         );
-        let off = times.iter().zip(&expected).fold(0.0_f64, |m, (a, b)| m.max((a.1 - b.1).abs()));
+        let off = largest(times.iter().zip(&expected).map(|(a, b)| a.1 - b.1));
         println!("{name}: {off:.1e}");
         assert!(off < tolerance, "{name}: {off:e}");
     }

@@ -66,7 +66,7 @@ fn tolerances_are_met() {
             let (q, p) = orbit(10.0);
             let planet = apart(&end, &[q, p].concat()) / tolerance;
 
-            let worst = oscillator.max(pendulum).max(planet);
+            let worst = largest([oscillator, pendulum, planet]);
             println!("{name} {tolerance:e}: oscillator {oscillator:.2}, pendulum {pendulum:.2}, planet {planet:.2}");
             assert!(worst < factor(name), "{name} {tolerance:e}: {worst}");
             assert!(worst > 1e-3 * factor(name), "{name} {tolerance:e}: {worst}, far too careful");
@@ -531,7 +531,7 @@ where
             let (mut a, mut b) = ([0.0; 2], [0.0; 2]);
             solver.dense(&mut y, theta, &mut a, &mut b);
             let (q, p) = orbit(t + theta * h);
-            worst = worst.max(apart(&[a, b].concat(), &[q, p].concat()));
+            worst = largest([worst, apart(&[a, b].concat(), &[q, p].concat())]);
         }
     }
     worst

@@ -86,7 +86,7 @@ fn a_stiff_phase_is_left_to_the_implicit_method() {
         for k in 0..=8 {
             let theta = f64::from(k) / 8.0;
             let (now, t) = (at(theta), t + theta * h);
-            worst = worst.max(apart(&now, &[1.0 - t.cos(), t.sin()]));
+            worst = largest([worst, apart(&now, &[1.0 - t.cos(), t.sin()])]);
         }
         last = at(1.0);
         // A step counts where the next one begins.

@@ -125,8 +125,22 @@ pub fn rotor() -> Interpreter<f64> {
     Interpreter::new(tree, [0.0; 3])
 }
 
+/// The largest absolute value; NaN where one is NaN, over which `f64::max` passes.
+pub fn largest(list: impl IntoIterator<Item = f64>) -> f64 {
+    list.into_iter().map(f64::abs).max_by(f64::total_cmp).unwrap_or(0.0)
+}
+
+/// The largest difference of two lists; NaN where a number of either is NaN.
+#[track_caller]
+pub fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len(), "lists that are compared");
+    largest(a.iter().zip(b).map(|(a, b)| a - b))
+}
+
 /// Root mean square of the differences of all components.
+#[track_caller]
 pub fn apart(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len(), "lists that are compared");
     (a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / a.len() as f64).sqrt()
 }
 

@@ -1,6 +1,8 @@
 //! Stabilisation after the steps of every kind of method.
 
 use super::systems::*;
+use crate::systems::largest;
+pub use crate::systems::largest_difference as apart;
 use mbd_runtime::constrained::{ConstraintError, Effort, Projection, Stabilisation, WithPostStep};
 use mbd_runtime::integrate::{
     Abm4, Dop853, Euler, Gauss12FixedPoint, Rk4, Solver, Step, StepDoubling, StepError, Stepper,
@@ -38,10 +40,6 @@ where
     WithPostStep::new(y, method, Projection::new(y, policy, Effort::default()))
 }
 
-pub fn apart(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
-}
-
 fn double() -> (Closed<Sticks>, State) {
     (Closed::new(Sticks::double()), (vec![0.8, -0.6, 1.4, 0.2], vec![0.0; 4]))
 }
@@ -57,7 +55,7 @@ fn drift() {
         let (q, p) = march(&mut y, &mut method, 400, 2.0, &start).unwrap();
         let (position, velocity) = y.off(&q, &p);
         let (_, sigma, _) = y.velocities(&q, &p);
-        let sigma = sigma.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let sigma = largest(sigma);
         let energy = (y.energy(&q, &p) - y.energy(&start.0, &start.1)).abs();
         println!("{policy:?}: drift {position:.1e}, velocities {velocity:.1e}, σ {sigma:.1e}, energy {energy:.1e}");
         assert!(velocity < 1e-13, "{policy:?}");
@@ -187,7 +185,7 @@ fn long_drift() {
     let ((mut q, mut p), mut worst) = (start, 0.0_f64);
     for k in 0..10_000 {
         method.step(&mut y, 1e-3 * f64::from(k), 1e-3, &mut q, &mut p).unwrap();
-        worst = worst.max(y.off(&q, &p).0);
+        worst = largest([worst, y.off(&q, &p).0]);
     }
     assert!(worst < 1e-15, "{worst}");
     assert_eq!(method.post_step.rank(), Some(2));

@@ -2,6 +2,7 @@
 
 use super::holding::{apart, held, march, State};
 use super::systems::*;
+use crate::systems::largest;
 use mbd_runtime::constrained::{OpenAndClosed, RadauIndex2, Rattle, Stabilisation};
 use mbd_runtime::integrate::{Solver, Step, Stepper, Verner9};
 
@@ -56,7 +57,7 @@ fn rattle_is_symplectic() {
         method.step(&mut y, f64::from(k) * h, h, &mut q, &mut p).unwrap();
         off.push(y.closed.energy(&q, &p) - before);
     }
-    let swing = off.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let swing = largest(off.iter().copied());
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
     let drift = mean(&off[off.len() * 9 / 10..]) - mean(&off[..off.len() / 10]);
     println!("swing {swing:.2e}, drift {drift:.2e}, of {before:.2e} J, {:?}", method.statistics());

@@ -1,5 +1,6 @@
 //! Small systems with constraints, written by hand.
 
+use crate::systems::largest;
 use mbd_runtime::constrained::{close, Closing, ConstraintError};
 use mbd_runtime::system::{LieGroup, LieJoint, Row};
 use mbd_runtime::{Conjugate, Constrained, Energetic, System};
@@ -113,7 +114,7 @@ impl<T: Model> Closed<T> {
         let (v, _, phi) = self.velocities(q, p);
         let residual = self.model.constraint_residuals(q).0;
         let rates = phi.iter().map(|row| row.iter().zip(&v).map(|(a, v)| a * v).sum::<f64>());
-        (residual.iter().fold(0.0, |m, x| m.max(x.abs())), rates.fold(0.0, |m, x| m.max(x.abs())))
+        (largest(residual), largest(rates))
     }
 
     #[allow(clippy::ptr_arg)] // The trait takes these types.

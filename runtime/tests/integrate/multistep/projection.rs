@@ -4,6 +4,7 @@ use mbd_runtime::integrate::{Ab4, Ab6, Abm8, Chart, EnergyProjection, Field, Poi
 use mbd_runtime::Energetic;
 
 use super::systems::{body, pendulum, top, Sledge};
+use crate::systems::largest;
 
 /// Compares the gradient of the energy, which follows from the rates, with differences of the energy.
 fn gradient<Y: Energetic<Scalar = f64> + Clone>((mut y, q, p): (Y, Y::Coordinates, Y::Momenta)) {
@@ -62,7 +63,7 @@ fn energies<Y: Energetic<Scalar = f64> + Clone, M: Stepper<Y>>(
                 false => method.step(&mut y, 0.0, h, &mut q, &mut p).unwrap(),
             }
             let (kinetic, potential) = y.energies(&q, &p);
-            worst = worst.max((kinetic + potential - projection.target()).abs() / 10.0);
+            worst = largest([worst, (kinetic + potential - projection.target()) / 10.0]);
         }
         worst
     })

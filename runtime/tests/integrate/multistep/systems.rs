@@ -1,5 +1,6 @@
 //! Mechanisms written by hand, and functions that integrate them.
 
+pub use crate::systems::largest_difference as apart;
 use mbd_runtime::integrate::Stepper;
 use mbd_runtime::system::{LieGroup, LieJoint};
 use mbd_runtime::{Energetic, Real, Scalar, System};
@@ -203,10 +204,6 @@ pub fn walk<Y: System<Scalar = f64>>(
         method.step(&mut y, f64::from(i) * h, h, &mut q, &mut p).expect("a step");
     }
     q.as_ref().iter().chain(p.as_ref()).copied().collect()
-}
-
-pub fn apart(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()))
 }
 
 pub fn walk_on<Y: System, M: Stepper<Y>>(
