@@ -122,3 +122,40 @@ fn a_motion_by_implicit_methods_goes_on_after_a_kick() {
     goes_on_as_new("rodas5p", y(), &force, Rodas5P::new, 100.0);
     goes_on_as_new("switching", y(), &force, |y| AutoSwitch::new(y, Dop853::new(y), Radau5::new(y)), 100.0);
 }
+
+/// A kick comes with a drag that makes the motion stiff, and the implicit method takes over once the kick has decayed. The next
+/// kick comes with the weak drag of before, and the motion goes on by the explicit method. With a constant rate `λ`, a kick of
+/// `δ` adds `δ exp(−λ s)` to the momentum after `s` seconds, and `δ (1 − exp(−λ s))/λ` to the coordinate.
+#[test]
+fn a_kick_that_makes_the_motion_stiff_leads_to_the_implicit_method() {
+    let (tolerance, rate) = (1e-10, Cell::new(1.0));
+    let mut y = Pulled(|_: f64| rate.get());
+    let method = AutoSwitch::new(&y, Dop853::new(&y), Radau5::new(&y));
+    let mut solver = adaptive(&mut y, method, tolerance, (&[0.0], &[0.0]));
+    // By how much coordinate and momentum are away from the motion without kicks.
+    let (mut start, mut off) = (0.0, [0.0, 0.0]);
+    let mut implicit = 0;
+    for (k, (end, kick, drag)) in [(1.0, 0.0, 1.0), (3.0, 0.5, 1e5), (5.0, -0.7, 1.0)].into_iter().enumerate() {
+        let [q, p] = state(&mut solver, &y)[..] else { panic!("a coordinate and a momentum") };
+        rate.set(drag);
+        solver.resume(&mut y, start, &[q], &[p + kick]).expect("a state");
+        let steps = solver.statistics().steps;
+        let found = run(&mut solver, &mut y, end).expect("a run");
+        let steps = solver.statistics().steps - steps;
+
+        let (kicked, decay) = (off[1] + kick, (-drag * (end - start)).exp());
+        off = [off[0] + kicked * (1.0 - decay) / drag, kicked * decay];
+        let error = apart(&found, &[1.0 - end.cos() + off[0], end.sin() + off[1]]);
+        let taken = solver.method().implicit_steps() - implicit;
+        println!("until {end}: {steps} steps, {taken} of them implicit; {error:e}");
+        // As in the motion above; the errors of all three parts add up.
+        assert!(error < 10.0 * tolerance, "until {end}: {error:e}");
+        if k == 1 {
+            // The explicit method alone takes 89,000.
+            assert!(taken > 0 && steps < 3000, "{taken} of {steps} steps");
+        } else {
+            assert_eq!(taken, 0, "until {end}");
+        }
+        (start, implicit) = (end, implicit + taken);
+    }
+}
