@@ -184,6 +184,12 @@ fn wrong_modes_are_refused() {
     bad(run_in(&folder, &["generate", &pendulum, "--modes", "masked"]), &["`double_pendulum` has no contacts"]);
     let record = ["simulate", &pendulum, "--record-modes", "p.modes"];
     bad(run_in(&folder, &record), &["--record-modes: `double_pendulum` has no contacts"]);
+    let steps = ["simulate", &hopper, "--contacts", "stepping", "--record-modes", "hopper.modes"];
+    bad(run_in(&folder, &steps), &["--record-modes: time steps visit no modes"]);
+    for taken in ["hopper.csv", "hopper.svg", "./hopper.svg", "still.svg"] {
+        let onto = ["simulate", &hopper, "--picture", "still.svg", "--record-modes", taken];
+        bad(run_in(&folder, &onto), &[&format!("--record-modes: `{taken}` is to hold another result already")]);
+    }
     assert_eq!(files(&folder), ["wrong.modes"]);
 }
 

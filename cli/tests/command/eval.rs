@@ -1,5 +1,8 @@
 //! The subcommand `mbd eval`.
 
+use std::io::{ErrorKind, Write};
+use std::process::{ChildStdin, Command, Output, Stdio};
+
 use crate::run::*;
 use serde_json::{json, Value};
 
@@ -124,6 +127,37 @@ fn eval_says_what_is_wrong() {
     let point = write(&folder, "point.toml", point);
     let zero = r#"{"params": {"m": 0}, "states": [{"q": [0, 0], "v": [0, 0]}]}"#;
     eval(&point, zero, &["states[0]: the mass matrix is singular: freedom `"]);
+}
+
+/// Runs `mbd eval` on states from standard input, to which `write` writes until it ends or the command does.
+fn eval_piped(write: impl FnOnce(&mut ChildStdin) -> std::io::Result<()>) -> Output {
+    let mut child = Command::new(PROGRAM)
+        .current_dir(ROOT)
+        .args(["eval", "models/double_pendulum.toml", "--input", "-"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    let mut input = child.stdin.take().expect("its standard input");
+    let written = write(&mut input);
+    drop(input);
+    // A command that reads no further closes its end.
+    assert!(written.is_ok() || written.is_err_and(|e| e.kind() == ErrorKind::BrokenPipe));
+    child.wait_with_output().expect("the program ends")
+}
+
+#[test]
+fn eval_reads_standard_input_up_to_its_limit() {
+    let states = r#"{"states": [{"q": [0.1, 0.2], "v": [0.3, -0.4]}]}"#;
+    let piped = good(eval_piped(|input| input.write_all(states.as_bytes())));
+    let file = write(&folder("eval_piped"), "states.json", states);
+    let of_file = good(run(&["eval", "models/double_pendulum.toml", "--input", &file]));
+    assert_eq!(out(&piped), out(&of_file));
+    // 257 MiB of blanks: one that read all of them would say that they are no JSON.
+    let blanks = vec![b' '; 1 << 20];
+    let endless = eval_piped(|input| (0..257).try_for_each(|_| input.write_all(&blanks)));
+    bad(endless, &["cannot read standard input: it is longer than 256 MiB\n  help: pipe fewer states in"]);
 }
 
 /// Rotates by a quaternion w, x, y, z.

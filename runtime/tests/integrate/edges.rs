@@ -88,3 +88,30 @@ fn a_state_has_a_time() {
         assert!(matches!(solver.run(&mut y, 1.0), Err(StepError::InvalidEnd { .. })), "{time}");
     }
 }
+
+/// Dense output of `Gauss16` solves the equations of a shorter step. Where that fails, it is the cubic through both ends of the
+/// step and their rates. A drag that acts for a hundredth of a second about 0.296 s is met by a node of half the step from 0 to
+/// 1 s, but by none of the whole step and of its quarter.
+#[test]
+fn dense_output_that_cannot_be_solved_for_is_a_cubic() {
+    let mut y = Plain::new(|t: f64, q: &[f64; 1], p: &[f64; 1]| {
+        let drag = if (t - 0.2959).abs() < 0.005 { 1e9 } else { 0.0 };
+        (*p, [-q[0] - drag * p[0]])
+    });
+    let method = Gauss16::new(&y);
+    let mut solver = Solver::new(&mut y, method, Step::Fixed(1.0), 0.0, &[1.0], &[0.0]).expect("a start");
+    solver.advance(&mut y, 1.0).expect("a step");
+    let mut at = |theta: f64| {
+        let (mut q, mut p) = ([f64::NAN], [f64::NAN]);
+        solver.dense(&mut y, theta, &mut q, &mut p);
+        [q[0], p[0]]
+    };
+    // The drag does not act at the nodes of these: the motion is that of the oscillator.
+    for t in [0.25, 1.0] {
+        assert!(largest_difference(&at(t), &[t.cos(), -t.sin()]) < 1e-14, "{t}: {:?}", at(t));
+    }
+    // The mean of both ends, and an eighth of the difference of their rates.
+    let (s, c) = 1.0_f64.sin_cos();
+    let cubic = [0.5 * (1.0 + c) + 0.125 * s, 0.5 * -s + 0.125 * (c - 1.0)];
+    assert!(largest_difference(&at(0.5), &cubic) < 1e-14, "{:?} {cubic:?}", at(0.5));
+}

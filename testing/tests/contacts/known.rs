@@ -3,7 +3,7 @@
 use mbd_codegen::model::{ConstraintKind, Contact, LoopKind, Model, Mount, Origin, Placement, Value};
 use mbd_runtime::contact::{Mode, RestitutionLaw};
 
-use super::scene::{model, Scene};
+use super::scene::{apart, model, Scene};
 
 /// A ball about a point of a body touches the floor.
 pub(super) fn on_floor(
@@ -146,6 +146,33 @@ fn a_block_that_slides_up_an_incline_comes_back() {
     assert!((stop.time - turn).abs() < 1e-12, "{} {turn}", stop.time);
     assert!((scene.q[0] - at).abs() < 1e-11, "{:e}", scene.q[0] - at);
     assert_eq!(scene.system.modes(), [Mode::Slide; 2]);
+}
+
+/// A body slides on two feet, 1 m below its centre of mass, which is behind both of them: only friction keeps it from tipping
+/// back. From a unit of friction at the front foot, the normal force there grows by `µ·1 m/0.5 m = 1`, so that the front foot
+/// alone could have any normal force. Of both feet they are known: half the weight each.
+#[test]
+fn feet_share_a_weight_that_friction_holds() {
+    let (g, friction, speed, end) = (9.81, 0.5, 3.0, 0.5);
+    for feet in [[("front", 0.75), ("rear", 0.25)], [("rear", 0.25), ("front", 0.75)]] {
+        let mut model = block(friction, 0.0, 0.0);
+        model.contacts.clear();
+        let body = model.bodies.len() - 1;
+        for (name, x) in feet {
+            on_floor(&mut model, name, body, [x, 0.0, -1.0], 0.0, friction, 0.0);
+        }
+        let mut scene = Scene::new(model, &[0.0, 1.0, 0.0], &[speed, 0.0, 0.0]);
+        scene.run(end);
+        assert!(scene.events.0.is_empty(), "{feet:?}: {:?}", scene.events.0);
+        assert_eq!(scene.system.modes(), [Mode::Slide; 2]);
+        let expected = [speed * end - 0.5 * friction * g * end * end, 1.0, 0.0];
+        assert!(apart(&scene.q, &expected) < 1e-12, "{feet:?}: {:?} {expected:?}", scene.q);
+        let forces = scene.system.forces(end, &scene.q.clone(), &scene.p.clone());
+        for force in forces.iter() {
+            // Half the weight of 2 kg, and friction against the way.
+            assert!(apart(force, &[g, -friction * g, 0.0]) < 1e-11, "{feet:?}: {forces:?}");
+        }
+    }
 }
 
 /// A free body.

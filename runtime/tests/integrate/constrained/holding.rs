@@ -210,3 +210,23 @@ fn positions_that_cannot_be_closed_are_refused() {
     assert!(method.step(&mut y, 0.0, 10.0, &mut q, &mut p).is_err());
     assert_eq!((q, p), start);
 }
+
+/// A motion that begins again at an earlier time is judged by itself: a step that takes too large a part of its kinetic energy is
+/// refused, however large that of the motion before was.
+#[test]
+fn a_projection_judges_each_motion_by_its_own_energy() {
+    let (mut y, (q, _)) = double();
+    // Both masses turn about the origin, with 2 rad/s and with 100 rad/s.
+    let [slow, fast] = [2.0, 100.0].map(|rate| (q.clone(), [0.6, 0.8, -0.2, 1.4].map(|r| rate * r).to_vec()));
+    for policy in [Stabilisation::Momenta, Stabilisation::Mass] {
+        let mut new = held(&y, Euler::new(&y), policy);
+        let refused = march(&mut y, &mut new, 1, 0.2, &slow).unwrap_err();
+        let StepError::Constraint { error: ConstraintError::Energy { taken, kinetic, .. }, .. } = refused else {
+            panic!("{policy:?}: {refused:?}")
+        };
+        println!("{policy:?}: {taken:.1e} J of {kinetic:.1e} J");
+        let mut used = held(&y, Euler::new(&y), policy);
+        march(&mut y, &mut used, 20_000, 0.4, &fast).unwrap();
+        assert_eq!(march(&mut y, &mut used, 1, 0.2, &slow).unwrap_err(), refused, "{policy:?}");
+    }
+}
