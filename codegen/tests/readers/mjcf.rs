@@ -371,6 +371,97 @@ fn actuators_and_tendons_tell_what_joints_have() {
     assert!(findings.contains("warning: the law of an actuator (`position`)"), "{findings}");
 }
 
+/// Rotors and dampers of actuators are their joints', times the square of `gear`. The numbers are the differences that they make
+/// to `mj_fullM` and `qfrc_passive` of MuJoCo 4.0.0.
+#[test]
+fn rotors_and_dampers_of_actuators_are_those_of_joints() {
+    let of = |before: &str, actuators: &str| {
+        let text = format!(
+            "{before}<worldbody><body><joint name='a' damping='0.1'/>{BALL}<site name='s'/></body>\
+             <body><joint name='b' type='ball'/>{BALL}</body><body><freejoint name='f'/>{BALL}</body></worldbody>\
+             <tendon><fixed name='t'><joint joint='a' coef='2'/></fixed></tendon><actuator>{actuators}</actuator>"
+        );
+        let (m, _) = model(&text);
+        let first = |values: &[Value]| x(values[0]);
+        m.joints.iter().map(|j| (first(&j.armature), first(&j.damping))).collect::<Vec<_>>()
+    };
+    let close = |got: Vec<(f64, f64)>, wanted: [(f64, f64); 3]| {
+        let far = |(a, b): (f64, f64), (c, d): (f64, f64)| (a - c).abs() > 1e-14 || (b - d).abs() > 1e-14;
+        assert!(
+            got.len() == 3 && got.iter().zip(wanted).all(|(got, wanted)| !far(*got, wanted)),
+            "{got:?}, {wanted:?}"
+        );
+    };
+    let both = "armature='0.5' damping='0.7'";
+    for motor in [
+        format!("<motor joint='a' {both} gear='3'/>"),
+        format!("<motor jointinparent='a' {both} gear='-3 7 7'/>"),
+        format!("<general joint='a' {both} gear='3' forcerange='-1 1'/>"),
+        format!("<position joint='a' kp='1' {both} gear='3'/>"),
+        format!("<velocity joint='a' {both} gear='3' group='1'/>"),
+        format!("<dcmotor joint='a' motorconst='0.1' resistance='1' {both} gear='3'/>"),
+        format!("<motor tendon='t' {both} gear='1.5'/>"),
+    ] {
+        close(of("", &motor), [(4.5, 6.4), (0.0, 0.0), (0.0, 0.0)]);
+    }
+    // Those of several are added, and classes of all kinds of actuators count.
+    let two = "<motor joint='a' armature='0.5'/><motor joint='a' armature='0.5' damping='0.2' gear='2'/>";
+    close(of("", two), [(2.5, 0.9), (0.0, 0.0), (0.0, 0.0)]);
+    let class = "<default><general armature='0.5'/><position damping='0.7 0 0'/></default>";
+    close(of(class, "<motor joint='a' gear='3'/>"), [(4.5, 6.4), (0.0, 0.0), (0.0, 0.0)]);
+    // All freedoms of a ball have them, and so have those of a free joint; an `orientation` has none.
+    let others = format!("<motor joint='b' {both} gear='3 2 1'/><motor joint='f' damping='0.7' gear='3 2 1'/>");
+    close(of("", &others), [(0.0, 0.1), (4.5, 6.3), (0.0, 6.3)]);
+    close(of(class, "<orientation joint='b'/>"), [(0.0, 0.1), (0.0, 0.0), (0.0, 0.0)]);
+    // A flag switches dampers off, and rotors never.
+    let off = "<option><flag damper='disable' actuation='disable'/></option>";
+    close(of(off, &format!("<motor joint='a' {both}/>")), [(0.5, 0.0), (0.0, 0.0), (0.0, 0.0)]);
+
+    // A free joint with a rotor is three slides and a ball, all of which have that of the actuator, too.
+    let free = |rotor: &str| {
+        format!(
+            "<worldbody><body><joint name='f' type='free' {rotor}/>{BALL}</body></worldbody>\
+             <actuator><motor joint='f' armature='0.5' damping='0.7' gear='2'/></actuator>"
+        )
+    };
+    let (m, _) = model(&free("armature='1'"));
+    assert_eq!(m.joints.len(), 4);
+    for joint in &m.joints {
+        assert!(joint.armature.iter().all(|a| *a == Value::Const(3.0)), "{:?}", joint.armature);
+        assert!(joint.damping.iter().all(|d| (x(*d) - 2.8).abs() < 1e-14), "{:?}", joint.damping);
+    }
+    let findings = refused(&free(""));
+    assert!(findings.contains("`armature` of an actuator on a free joint without one of its own"), "{findings}");
+}
+
+/// Rotors and dampers of actuators that are not those of a joint are refused where they act.
+#[test]
+fn rotors_and_dampers_of_actuators_on_no_joint_are_refused() {
+    let text = |actuator: &str| {
+        format!(
+            "<worldbody><body><joint name='a'/><joint name='b' axis='1 0 0'/>{BALL}<site name='s'/></body></worldbody>\
+             <tendon><fixed name='two'><joint joint='a' coef='2'/><joint joint='b' coef='1'/></fixed>\
+             <spatial name='string'><site site='s'/><site site='s'/></spatial></tendon><actuator>{actuator}</actuator>"
+        )
+    };
+    for (on, said) in [
+        ("site='s'", "on neither a joint nor a tendon is not modelled"),
+        ("cranksite='s' slidersite='s' cranklength='1'", "on neither a joint nor a tendon is not modelled"),
+        ("tendon='two'", "on a tendon that is not a fixed one over one joint is not modelled"),
+        ("tendon='string'", "on a tendon that is not a fixed one over one joint is not modelled"),
+        ("tendon='three'", "`three` is not a tendon"),
+        ("joint='c'", "`c` is not a joint"),
+    ] {
+        for key in ["armature", "damping"] {
+            let findings = refused(&text(&format!("<motor name='m' {on} {key}='1'/>")));
+            assert!(findings.contains("error: actuator `m`: ") && findings.contains(said), "{said}: {findings}");
+        }
+        model(&text(&format!("<motor name='m' {on} armature='0' damping='0 0 0'/>")));
+    }
+    let findings = refused(&text("<motor joint='a' damping='1 2'/>"));
+    assert!(findings.contains("actuator without a name: a `damping` that is not linear is not modelled"), "{findings}");
+}
+
 #[test]
 fn ranges_are_stops_and_geoms_touch_where_that_is_asked_for() {
     let text = "<mujoco><worldbody><geom type='plane' size='1 1 1'/><body name='a' pos='0 0 1'>\

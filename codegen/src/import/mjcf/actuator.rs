@@ -1,14 +1,18 @@
-//! `actuator`: no actuator is part of a model, but each tells the largest effort of its joint.
+//! `actuator`: no actuator is part of a model, but each tells the largest effort of its joint, and has a rotor and a damper
+//! that are passive: they are those of the joint.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use super::build::Built;
 use super::classes::{Classes, MAIN};
 use super::element::{limited, numbers, Element};
-use super::joint::Rules;
+use super::joint::{Kind, Rules};
+use super::tendon::{self, Tendon};
 use crate::diag::Severity;
 use crate::import::raw::{RawModel, RawNumber, RawValue};
-use crate::import::source::Span;
+use crate::import::source::{Span, Spanned};
+use crate::import::words::quote;
 use crate::import::xml::{place, Reader};
 use roxmltree::Node;
 
@@ -29,26 +33,41 @@ const LAWS: [&str; 10] = [
     "orientation",
 ];
 
-/// Reads all actuators of a section, and adds their largest efforts to `efforts`, by joints of the raw model; `None`
-/// where one of them has no bound.
+/// What actuators act on.
+pub(super) struct Driven<'p, 'd> {
+    /// Joints.
+    pub built: &'p Built<'d>,
+    /// Tendons.
+    pub tendons: &'p HashMap<&'d str, Tendon>,
+    /// Largest efforts, by joints of the raw model; `None` where an actuator of the joint has no bound.
+    pub efforts: HashMap<usize, Option<(f64, Span)>>,
+}
+
+/// Reads all actuators of a section: adds their largest efforts to those of `driven`, and their rotors and dampers to the
+/// joints of the raw model.
 pub(super) fn all<'d>(
     reader: &mut Reader,
     section: Node<'d, 'd>,
     classes: &Classes<'d>,
-    built: &Built<'d>,
     rules: Rules,
-    efforts: &mut HashMap<usize, Option<(f64, Span)>>,
+    driven: &mut Driven<'_, 'd>,
+    raw: &mut RawModel,
 ) {
     let tags: Vec<&str> = MOTORS.into_iter().chain(LAWS).chain(["plugin"]).collect();
     for node in reader.children(section, &tags, &[]) {
         let element = classes.resolve(reader, node, &tags, MAIN);
         let tag = node.tag_name().name();
         told(reader, &element, tag);
-        let Some(known) = element.attribute("joint").and_then(|name| built.joints.get(name.value)) else { continue };
+        let gear = numbers(reader, &element, "gear", 1..=6, "actuator: ").map_or(1.0, |gear| gear.value[0]);
+        // The one that turns balls has neither, also where its class has.
+        if tag != "orientation" {
+            passive(reader, &element, gear, rules, driven, raw);
+        }
+        let Some(known) = joint(&element).and_then(|name| driven.built.joints.get(name.value)) else { continue };
         if !known.kind.is_scalar() {
             continue;
         }
-        let effort = effort(reader, &element, tag, rules);
+        let (effort, efforts) = (effort(reader, &element, (tag, gear), rules), &mut driven.efforts);
         let sum = match (efforts.get(&known.index), effort) {
             (None, effort) => effort.map(|x| (x, place(node))),
             (Some(Some((old, span))), Some(x)) => Some((old + x, *span)),
@@ -56,6 +75,82 @@ pub(super) fn all<'d>(
         };
         efforts.insert(known.index, sum);
     }
+}
+
+/// The joint that an actuator names. Where its gear is seen from matters to directions alone.
+fn joint<'d>(element: &Element<'d>) -> Option<Spanned<&'d str>> {
+    element.attribute("joint").or_else(|| element.attribute("jointinparent"))
+}
+
+/// Adds the rotor and the damper of an actuator to all freedoms of its joint, times the square of the gear ratio. Those of
+/// a tendon over one joint are the joint's; others are refused.
+fn passive(reader: &mut Reader, element: &Element, gear: f64, rules: Rules, driven: &Driven, raw: &mut RawModel) {
+    let shown = element.name().map_or("without a name".into(), |name| quote(name.value));
+    let whose = format!("actuator {shown}: ");
+    for (key, most) in [("armature", 1), ("damping", 3)] {
+        let Some(given) = numbers(reader, element, key, 1..=most, &whose).filter(|x| x.value.iter().any(|x| *x != 0.0))
+        else {
+            continue;
+        };
+        if key == "damping" && !rules.options.on("damper") {
+            continue;
+        }
+        if given.value[1..].iter().any(|x| *x != 0.0) {
+            let message = format!("{whose}a `{key}` that is not linear is not modelled");
+            reader.findings.error(given.span, message, "write one number, or add its effort as one of your own");
+            continue;
+        }
+        match target(element, driven, key) {
+            Ok((joints, ratio)) => {
+                for joint in raw.joints.get_mut(joints).into_iter().flatten() {
+                    let slot = if key == "armature" { &mut joint.armature } else { &mut joint.damping };
+                    tendon::add(slot, gear * ratio, &given);
+                }
+            }
+            Err((at, problem, help)) => {
+                reader.findings.error(at.unwrap_or(given.span), format!("{whose}{problem}"), help);
+            }
+        }
+    }
+}
+
+/// The joints of the raw model that have what an actuator has under a key, and their velocity ratio to its transmission
+/// without `gear`; or else where, why and what to do.
+fn target(
+    element: &Element,
+    driven: &Driven,
+    key: &str,
+) -> Result<(Range<usize>, f64), (Option<Span>, String, &'static str)> {
+    let unknown = |name: Spanned<&str>, what: &str, help| {
+        Err((Some(name.span), format!("{} is not a {what}", quote(name.value)), help))
+    };
+    if let Some(name) = joint(element) {
+        let Some(known) = driven.built.joints.get(name.value) else {
+            return unknown(name, "joint", "name a joint of this file");
+        };
+        // MuJoCo's rotors of a free joint act in the axes of the world: see `Joint::elements`.
+        if known.kind == Kind::Free && key == "armature" && known.parts == 1 {
+            let problem = format!("`{key}` of an actuator on a free joint without one of its own is not modelled");
+            let help = "give it to the joint (`type=\"free\"`), times the square of the first number of `gear`";
+            return Err((None, problem, help));
+        }
+        return Ok((known.index..known.index + known.parts, 1.0));
+    }
+    let name = element.attribute("tendon");
+    if let Some(name) = name.clone() {
+        let Some(tendon) = driven.tendons.get(name.value) else {
+            return unknown(name, "tendon", "name a tendon of this file");
+        };
+        if let Some((index, ratio)) = tendon.only() {
+            return Ok((index..index + 1, ratio));
+        }
+    }
+    let what = match name {
+        Some(_) => "a tendon that is not a fixed one over one joint",
+        None => "neither a joint nor a tendon",
+    };
+    let problem = format!("`{key}` of an actuator on {what} is not modelled");
+    Err((None, problem, "set it to 0, and add its effort as one of your own"))
 }
 
 /// Says that an actuator is no part of the model.
@@ -71,8 +166,8 @@ fn told(reader: &mut Reader, element: &Element, tag: &str) {
     }
 }
 
-/// The largest effort of an actuator on its joint, N m or N.
-fn effort(reader: &mut Reader, element: &Element, tag: &str, rules: Rules) -> Option<f64> {
+/// The largest effort of an actuator with a tag and a gear ratio on its joint, N m or N.
+fn effort(reader: &mut Reader, element: &Element, (tag, gear): (&str, f64), rules: Rules) -> Option<f64> {
     let auto = rules.compiler.autolimits;
     let mut bound = |limit: &str, range: &str| {
         if !limited(reader, element, (limit, range), auto, "actuator: ") {
@@ -83,7 +178,6 @@ fn effort(reader: &mut Reader, element: &Element, tag: &str, rules: Rules) -> Op
     };
     let force = bound("forcelimited", "forcerange");
     let control = if tag == "motor" { bound("ctrllimited", "ctrlrange") } else { None };
-    let gear = numbers(reader, element, "gear", 1..=6, "actuator: ").map_or(1.0, |gear| gear.value[0]);
     let least = force.into_iter().chain(control).reduce(f64::min)?;
     Some(least * gear.abs()).filter(|x| *x > 0.0)
 }

@@ -44,6 +44,8 @@ pub(super) struct Known {
     pub rest: f64,
     /// Index among the joints of the raw model.
     pub index: usize,
+    /// How many joints of the raw model it is, from that index on.
+    pub parts: usize,
 }
 
 /// What the names of the file stand for.
@@ -262,7 +264,8 @@ impl<'d> Built<'d> {
     fn know(&mut self, part: &Part<'d>, joint: &Joint, name: &str, index: usize) {
         let Some(given) = part.element.name() else { return };
         let Joint { kind, reference, rest, .. } = *joint;
-        self.joints.insert(given.value, Known { name: name.to_string(), kind, reference, rest, index });
+        let parts = joint.parts();
+        self.joints.insert(given.value, Known { name: name.to_string(), kind, reference, rest, index, parts });
     }
 
     /// Adds the frame of a site.

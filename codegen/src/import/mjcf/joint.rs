@@ -253,12 +253,21 @@ impl Joint {
         }
     }
 
+    /// How many joints it becomes.
+    pub fn parts(&self) -> usize {
+        if self.kind == Kind::Free && self.armature != 0.0 {
+            4
+        } else {
+            1
+        }
+    }
+
     /// The joints that it becomes, with what their names end in and their first coordinates; `pose` is that of the body
     /// in the file. MuJoCo's rotors of a free joint resist its velocity in the axes of the world, which those of a
     /// floating joint do not: with rotors it is three slides and a ball, whose coordinates and velocities are the same.
     pub fn elements(self, pose: &Pose) -> Vec<(&'static str, Joint, Vec<f64>)> {
         let start = self.start(pose);
-        if self.kind != Kind::Free || self.armature == 0.0 {
+        if self.parts() == 1 {
             return vec![("", self, start)];
         }
         let axes = [("_x", [1.0, 0.0, 0.0]), ("_y", [0.0, 1.0, 0.0]), ("_z", [0.0, 0.0, 1.0])];

@@ -164,11 +164,11 @@ fn read_mujoco<'d>(
             equality::all(reader, section, &classes, &mut parts, &mut taken, &mut raw);
         }
     }
-    let mut efforts = HashMap::new();
+    let mut driven = actuator::Driven { built: &built, tendons: &tendons, efforts: HashMap::new() };
     for section in called("actuator") {
-        actuator::all(reader, section, &classes, &built, rules, &mut efforts);
+        actuator::all(reader, section, &classes, rules, &mut driven, &mut raw);
     }
-    actuator::bound(&efforts, &mut raw);
+    actuator::bound(&driven.efforts, &mut raw);
     Some(raw)
 }
 

@@ -23,6 +23,13 @@ pub(super) struct Tendon {
     only: Option<(usize, f64)>,
 }
 
+impl Tendon {
+    /// Index of the only joint among those of the raw model, and its coefficient; `None` where there are several, or none.
+    pub fn only(&self) -> Option<(usize, f64)> {
+        Some((self.only?.0, self.terms.first()?.2))
+    }
+}
+
 const ATTRIBUTES: &[&str] = &[
     "name",
     "class",
@@ -148,7 +155,7 @@ fn spring(element: &Element, joint: &mut RawJoint, rest: f64, ratio: f64, given:
 }
 
 /// Adds to the coefficient of a joint of one freedom what acts on its coordinate times a ratio.
-fn add(slot: &mut Option<RawFreedoms>, ratio: f64, given: &Spanned<Vec<f64>>) -> bool {
+pub(super) fn add(slot: &mut Option<RawFreedoms>, ratio: f64, given: &Spanned<Vec<f64>>) -> bool {
     let old = match slot {
         Some(RawFreedoms::All(Spanned { value: RawValue::Const(x), .. })) => *x,
         _ => 0.0,
