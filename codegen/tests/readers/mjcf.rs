@@ -634,6 +634,55 @@ fn inertias_of_meshes() {
     }
 }
 
+/// The mass of a body that cannot move is left out where it cannot be read, as MuJoCo needs it for no motion; that of a body
+/// which another one carries counts.
+#[test]
+fn masses_that_no_motion_depends_on() {
+    let text = |compiler: &str, outer: &str, inner: &str, geom: &str| {
+        format!(
+            "<compiler meshdir='meshes' {compiler}/><asset><mesh name='none' file='none.stl'/><mesh name='m' file='corner.stl'/>\
+             </asset><worldbody><body name='table' {outer}>{BALL}<body name='top'>{inner}{geom}<geom size='0.1' mass='2'/></body>\
+             </body><body name='arm'><joint name='j' axis='0 1 0'/><geom size='0.1' mass='3' pos='1 0 0'/></body></worldbody>"
+        )
+    };
+    let left_out = "notice: the mass of a body that cannot move is left out";
+    let geoms = [
+        (
+            "<geom type='mesh' mesh='none'/>",
+            "mesh `none`: cannot read `none.stl`: no such file; the mass of body `top` depends",
+        ),
+        ("<geom type='hfield' hfield='h' contype='0' conaffinity='0'/>", "body `top`: the mass of a height field"),
+        ("<geom type='box' mesh='m'/>", "body `top`: the mass of a primitive that is fitted to a mesh is not read"),
+    ];
+    for (geom, said) in geoms {
+        for outer in ["", "mocap='true'"] {
+            let (m, findings) = model(&text("", outer, "", geom));
+            let masses: Vec<_> = m.bodies.iter().map(|b| x(b.mass)).collect();
+            // That of the ball is known.
+            assert!(masses[0] > 4.0 && masses[1..] == [0.0, 3.0], "{masses:?}");
+            assert!(findings.contains(left_out), "{findings}");
+        }
+        // A joint moves the body, or the mass in total is stated.
+        for (compiler, inner) in [("", "<joint name='k'/>"), ("settotalmass='9'", "")] {
+            let findings = refused(&text(compiler, "", inner, geom));
+            assert!(findings.contains(said) && !findings.contains(left_out), "{findings}");
+        }
+        let carried = text("", "", "", geom).replace("<body name='top'>", "<joint name='l'/><body name='top'>");
+        assert!(refused(&carried).contains(said));
+    }
+    // What can be read is there.
+    let (m, findings) = model(&text("", "", "", "<geom type='mesh' mesh='m' mass='5'/>"));
+    assert!(x(m.bodies[1].mass) == 7.0 && !findings.contains(left_out), "{findings}");
+    // The mesh of a body that stands and of one that moves behind it.
+    let two = text("", "", "", geoms[0].0).replace("<geom size='0.1' mass='3'", "<geom type='mesh' mesh='none'");
+    let findings = refused(&two);
+    assert!(findings.contains("no such file; the mass of body `arm` depends on it"), "{findings}");
+    assert_eq!(findings.matches("cannot read `none.stl`").count(), 1, "{findings}");
+    // A name that there is not is an error wherever it stands.
+    let findings = refused(&text("", "", "", "<geom type='mesh' mesh='nine'/>"));
+    assert!(findings.contains("error: `nine` is not a mesh"), "{findings}");
+}
+
 /// A model with a ball and a height field of these attributes, its findings, and those with a floor.
 fn on_field(attributes: &str) -> [(Option<Model>, String); 2] {
     let text = format!(

@@ -81,9 +81,13 @@ pub(super) fn all<'d>(
     built.name(reader, bodies);
     let joint_names = built.name_joints(reader, bodies);
     let mut masses = Vec::new();
+    // Which bodies no joint moves.
+    let mut still: Vec<bool> = Vec::with_capacity(bodies.len());
     for (k, body) in bodies.iter().enumerate() {
         let parent = body.parent.map_or(Pose::IDENTITY, |parent| built.poses[parent]);
         built.poses.push(parent.then(&body.pose));
+        let stands = body.parent.is_none_or(|parent| still[parent]);
+        still.push(stands && body.joints.is_empty());
         let whose = |tag: &str, part: &Part| match part.element.name() {
             Some(name) => format!("{tag} {}: ", quote(name.value)),
             None => format!("{tag} in {}: ", body.shown()),
@@ -109,7 +113,9 @@ pub(super) fn all<'d>(
         }
         if k > 0 {
             let mut geoms: Vec<Geom> = geoms.into_iter().map(|(_, geom)| geom).collect();
-            masses.push(inertia::of_body(reader, body, &mut geoms, rules.compiler, solids.meshes));
+            // A mass in total is that of all bodies.
+            let needed = !still[k] || rules.compiler.total_mass.is_some();
+            masses.push(inertia::of_body(reader, (body, needed), &mut geoms, rules.compiler, solids.meshes));
             built.chain(reader, (k, body), &joint_names[k], rules, raw);
         }
         for part in &body.sites {

@@ -205,16 +205,21 @@ impl Geom<'_> {
         }
     }
 
-    /// Reads what its mass depends on.
-    pub fn weigh(&mut self, reader: &mut Reader, meshes: &Meshes, whose: &str) {
+    /// Reads what its mass depends on, and says whether that is known. Where it is not, and the mass is `needed`, it is
+    /// reported; `body` is what its body is called in findings.
+    pub fn weigh(&mut self, reader: &mut Reader, meshes: &Meshes, (body, needed): (&str, bool)) -> bool {
         if let Some(what) = self.unread() {
-            let message = format!("{whose}the mass of a {what} is not read");
+            let message = format!("{body}: the mass of a {what} is not read");
             let help = "give the body an `inertial` (MuJoCo writes all of them with `saveinertial=\"true\"`), or the \
                         geom `mass=\"0\"`";
-            reader.tally.add(Severity::Error, &format!("{what} {}", quote(whose)), self.span, message, help);
-        } else if let Some(mesh) = &self.mesh {
-            self.solid = meshes.solid(reader, mesh);
+            if needed {
+                reader.tally.add(Severity::Error, &format!("{what} {}", quote(body)), self.span, message, help);
+            }
+            return false;
         }
+        let Some(mesh) = &self.mesh else { return true };
+        self.solid = meshes.solid(reader, mesh, needed.then_some(body));
+        self.solid.is_some()
     }
 
     /// Centre of mass in its own axes, m.

@@ -27,10 +27,11 @@ pub(super) struct Mass {
     span: Span,
 }
 
-/// Mass and inertia of a body with these geoms; the world has none.
+/// Mass and inertia of a body with these geoms; the world has none. Where no motion depends on it, the mass is not `needed`:
+/// it is left out if a part of it cannot be read.
 pub(super) fn of_body(
     reader: &mut Reader,
-    body: &Body,
+    (body, needed): (&Body, bool),
     geoms: &mut [Geom],
     compiler: &Compiler,
     meshes: &Meshes,
@@ -43,10 +44,16 @@ pub(super) fn of_body(
         FromGeoms::Missing => body.inertial.is_none(),
     };
     if inferred {
+        let (shown, mut known) = (body.shown(), true);
         for geom in geoms.iter_mut().filter(|geom| geom.counts(compiler)) {
-            geom.weigh(reader, meshes, &whose);
+            known &= geom.weigh(reader, meshes, (shown.as_str(), needed));
         }
-        mass = of_geoms(geoms, compiler).or(mass);
+        mass = if known || needed { of_geoms(geoms, compiler).or(mass) } else { None };
+        if !known && !needed {
+            let message =
+                "the mass of a body that cannot move is left out where it is not read: no motion depends on it";
+            reader.tally.notice(place(body.node), message);
+        }
     }
     // Without anything that states it, MuJoCo's centre of mass stands where the body stands in its parent.
     let nowhere = body.own_pose;

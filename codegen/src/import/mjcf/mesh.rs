@@ -9,7 +9,7 @@ use super::element::{choice, numbers, parsed, vec3, Element};
 use super::pose::{normalised, rotate, Pose, Quat, NONE};
 use crate::import::hull::{self, Told};
 use crate::import::mesh::{self, corners, msh, stl, Triangle, MOST};
-use crate::import::source::Spanned;
+use crate::import::source::{Span, Spanned};
 use crate::import::words::quote;
 use crate::import::xml::{place, Reader};
 use crate::inertia::{cross, dot};
@@ -46,6 +46,14 @@ pub(super) struct Solid {
     pub inertia: [f64; 6],
 }
 
+/// Why the body that a mesh bounds is not known.
+enum Unread {
+    /// A finding that is added where a mass depends on the mesh.
+    Problem(Span, String),
+    /// It was reported.
+    Reported,
+}
+
 /// How the inertia of a mesh is computed.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
@@ -60,8 +68,8 @@ enum Kind {
 /// The meshes of a file, each of which is read where a mass depends on it.
 pub(super) struct Meshes<'m, 'd> {
     all: HashMap<String, Element<'d>>,
-    /// What was read; `None` where something was reported.
-    read: RefCell<HashMap<String, Option<Solid>>>,
+    /// What was read, or why nothing was.
+    read: RefCell<HashMap<String, Result<Solid, Unread>>>,
     /// Corners of hulls; `None` where something was reported.
     hulls: RefCell<HashMap<String, Option<Vec<[f64; 3]>>>>,
     told: RefCell<Told>,
@@ -80,13 +88,25 @@ impl<'m, 'd> Meshes<'m, 'd> {
         Meshes { all, read: RefCell::default(), hulls: RefCell::default(), told: RefCell::default(), assets }
     }
 
-    /// The body that a mesh bounds; `None` where something was reported, once for each mesh.
-    pub fn solid(&self, reader: &mut Reader, name: &Spanned<&str>) -> Option<Solid> {
-        if let Some(known) = self.read.borrow().get(name.value) {
-            return *known;
-        }
-        let solid = self.asset(reader, name).and_then(|element| self.of_asset(reader, element, name.value));
-        self.read.borrow_mut().insert(name.value.to_string(), solid);
+    /// The body that a mesh bounds; `None` where it is not known. That is reported, once for each mesh, where the mass of a
+    /// body depends on it, which is called `body` in findings.
+    pub fn solid(&self, reader: &mut Reader, name: &Spanned<&str>, body: Option<&str>) -> Option<Solid> {
+        let known = self.read.borrow_mut().remove(name.value);
+        let known = known.unwrap_or_else(|| match self.asset(reader, name) {
+            Some(element) => self.of_asset(reader, element, name.value),
+            None => Err(Unread::Reported),
+        });
+        let known = match (known, body) {
+            (Err(Unread::Problem(at, problem)), Some(body)) => {
+                let message = format!("{problem}; the mass of {body} depends on it");
+                let help = "give the bodies an `inertial` (MuJoCo writes all of them with `saveinertial=\"true\"`)";
+                reader.findings.error(at, message, help);
+                Err(Unread::Reported)
+            }
+            (known, _) => known,
+        };
+        let solid = known.as_ref().ok().copied();
+        self.read.borrow_mut().insert(name.value.to_string(), known);
         solid
     }
 
@@ -97,7 +117,7 @@ impl<'m, 'd> Meshes<'m, 'd> {
             let message = format!("{} is not a mesh", quote(name.value));
             reader.findings.error(name.span, message, "add it to `asset`");
             // It is reported once.
-            self.read.borrow_mut().insert(name.value.to_string(), None);
+            self.read.borrow_mut().insert(name.value.to_string(), Err(Unread::Reported));
         }
         found
     }
@@ -150,7 +170,7 @@ impl<'m, 'd> Meshes<'m, 'd> {
         self.told.borrow().tell(reader.findings);
     }
 
-    fn of_asset(&self, reader: &mut Reader, element: &Element, name: &str) -> Option<Solid> {
+    fn of_asset(&self, reader: &mut Reader, element: &Element, name: &str) -> Result<Solid, Unread> {
         let whose = format!("mesh {}: ", quote(name));
         let kind = choice(reader, element, "inertia", &["legacy", "exact", "shell", "convex"], &whose);
         let kind = match kind.as_ref().map_or("legacy", |word| word.value) {
@@ -169,14 +189,7 @@ impl<'m, 'd> Meshes<'m, 'd> {
             let triangles = self.triangles(reader, element, &whose)?;
             solid(&triangles.iter().map(|t| t.map(|v| frame.point(v))).collect::<Vec<_>>(), kind)
         });
-        match read {
-            Ok(solid) => Some(solid),
-            Err(problem) => {
-                let help = "give the bodies an `inertial` (MuJoCo writes all of them with `saveinertial=\"true\"`)";
-                reader.findings.error(at, format!("{whose}{problem}"), help);
-                None
-            }
-        }
+        read.map_err(|problem| Unread::Problem(at, format!("{whose}{problem}")))
     }
 
     /// The faces of a mesh in its own axes.
