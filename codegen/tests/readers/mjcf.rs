@@ -479,6 +479,41 @@ fn ranges_are_stops_and_geoms_touch_where_that_is_asked_for() {
     assert!(findings.contains("error: a model of MuJoCo states its own base"), "{findings}");
 }
 
+/// An empty range is a limit where it is called one only, and then refused: `jnt_limited`, `tendon_limited`,
+/// `actuator_forcelimited` and the errors of MuJoCo 4.0.0.
+#[test]
+fn empty_ranges_are_no_limits() {
+    let text = |joint: &str, tendon: &str, motor: &str| {
+        format!(
+            "<default><joint range='-9 9'/></default><worldbody><body><joint name='j' {joint}/>{BALL}</body></worldbody>\
+             <tendon><fixed {tendon}><joint joint='j' coef='1'/></fixed></tendon><actuator><motor joint='j' {motor}/></actuator>"
+        )
+    };
+    for joint in
+        ["range='0 0'", "range='-0 0' limited='auto'", "range='1 1'", "range='1 -1'", "range='0 0' limited='false'"]
+    {
+        let (m, findings) = model(&text(joint, "", ""));
+        assert_eq!(m.joints[0].bounds.range, None, "{joint}");
+        // What looks like a mistake is told.
+        let told = findings.contains("warning: joint `j`: `range` from 1 to ");
+        assert_eq!(told, joint.contains('1'), "{findings}");
+    }
+    assert!(model(&text("", "", "")).0.joints[0].bounds.range.is_some());
+    let findings = refused(&text("range='0 0' limited='true'", "", ""));
+    assert!(findings.contains("error: joint `j`: `range` from 0 to 0 is empty"), "{findings}");
+    let (_, findings) = model(&text("", "range='0 0'", ""));
+    assert!(!findings.contains("the limit of a tendon"), "{findings}");
+    let (_, findings) = model(&text("", "range='0 1'", ""));
+    assert!(findings.contains("the limit of a tendon"), "{findings}");
+    let effort = |joint: &str, motor: &str| model(&text(joint, "", motor)).0.joints[0].bounds.effort;
+    assert_eq!(effort("actuatorfrcrange='2 2'", "ctrlrange='0 0' forcerange='3 3'"), None);
+    assert_eq!(effort("actuatorfrcrange='0 0'", "ctrlrange='0 0' forcerange='-3 3'"), Some(3.0));
+    for wrong in ["range='0'", "range='0 x'", "range='0 0 x'", "range='0 0 0'", "range='NaN 0'", "range='0 NaN'"] {
+        let findings = refused(&text(wrong, "", ""));
+        assert!(findings.contains("error: joint `j`: `range`"), "{wrong}: {findings}");
+    }
+}
+
 /// Where there is a floor, meshes of moving bodies touch it with the corners of their hulls, placed as MuJoCo places the
 /// vertices.
 #[test]

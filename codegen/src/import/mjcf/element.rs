@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 
+use crate::diag::Severity;
 use crate::import::raw::RawValue;
 use crate::import::source::Spanned;
 use crate::import::words::{did_you_mean, list, quote};
@@ -147,8 +148,8 @@ pub(super) fn flag(reader: &mut Reader, element: &Element, name: &str, whose: &s
     choice(reader, element, name, &["false", "true"], whose).map(|word| word.value == "true")
 }
 
-/// Whether a range holds: where it says so, or says nothing and a range is stated. MuJoCo refuses a range without a
-/// statement if `autolimits` is off.
+/// Whether a range holds: where it says so, or says nothing and a range is stated that is not empty. MuJoCo refuses a range
+/// without a statement if `autolimits` is off.
 pub(super) fn limited(
     reader: &mut Reader,
     element: &Element,
@@ -160,7 +161,20 @@ pub(super) fn limited(
     match (stated, element.attribute(range)) {
         (Some("true"), _) => true,
         (Some("false"), _) | (_, None) => false,
-        (_, Some(_)) if auto => true,
+        (_, Some(text)) if auto => {
+            let ends: Vec<f64> = text.value.split_whitespace().map(|word| word.parse().unwrap_or(f64::NAN)).collect();
+            // What is no range is reported where it is read.
+            let [lower, upper] = ends[..] else { return true };
+            if !lower.is_finite() || !upper.is_finite() {
+                return true;
+            }
+            if lower > upper || (lower == upper && lower != 0.0) {
+                let message = format!("{whose}`{range}` from {lower} to {upper} is no limit, because it is empty");
+                let help = "write the lower end first, or remove it";
+                reader.tally.add(Severity::Warning, &format!("empty {range}"), text.span, message, help);
+            }
+            lower < upper
+        }
         (_, Some(text)) => {
             // Two zeros are none.
             if text.value.split_whitespace().any(|word| word.parse() != Ok(0.0)) {
