@@ -718,6 +718,28 @@ fn masses_that_no_motion_depends_on() {
     assert!(findings.contains("error: `nine` is not a mesh"), "{findings}");
 }
 
+/// Bodies that are not read are there: a file whose bodies are all copies is refused for these alone, and for what else is wrong
+/// beside them.
+#[test]
+fn bodies_that_are_not_read_are_not_missed() {
+    let body = "<body name='b'><freejoint name='f'/><geom size='.1'/></body>";
+    let others = "<equality><weld body1='b0'/></equality><actuator><motor joint='f0' armature='1'/></actuator>";
+    for (bodies, said) in [
+        (format!("<replicate count='3' offset='1 0 0'>{body}</replicate>"), "error: `replicate` is not read"),
+        (format!("<frame><replicate count='3'>{body}</replicate></frame>"), "error: `replicate` is not read"),
+        ("<attach model='other' prefix='x'/>".into(), "error: `attach` is not read"),
+    ] {
+        let findings = refused(&format!("<worldbody>{bodies}</worldbody>{others}"));
+        assert!(findings.contains(said), "{findings}");
+        assert_eq!(findings.matches("error").count(), 1, "{findings}");
+        let findings = refused(&format!("<worldbody><geom name='g' type='ball'/>{bodies}</worldbody>{others}"));
+        assert!(findings.contains(said) && findings.contains("error: geom `g`: `type` is `ball`"), "{findings}");
+    }
+    let findings = refused("<worldbody><geom size='1'/></worldbody>");
+    assert!(findings.contains("error: a model without bodies"), "{findings}");
+    assert!(refused("").contains("error: a model without bodies"));
+}
+
 /// A model with a ball and a height field of these attributes, its findings, and those with a floor.
 fn on_field(attributes: &str) -> [(Option<Model>, String); 2] {
     let text = format!(

@@ -125,7 +125,9 @@ fn read_mujoco<'d>(
     deformable(reader, &called("deformable"));
     let classes = Classes::read(reader, &called("default"));
     let bodies = tree::bodies(reader, &called("worldbody"), &classes, &compiler);
-    if bodies.len() < 2 {
+    // Bodies that are there and not read have been reported; what stands in the world itself is looked at all the same.
+    let unread = bodies.len() == 1 && bodies[0].unread;
+    if bodies.len() < 2 && !unread {
         let at = called("worldbody").first().map_or(place(root), |node| place(*node));
         reader.findings.error(at, "a model without bodies", "give at least one `body` in `worldbody`");
         return None;
@@ -151,6 +153,10 @@ fn read_mujoco<'d>(
     };
     let mut built = build::all(reader, &bodies, rules, (solids, shapes), &mut raw);
     meshes.tell(reader);
+    // All that names bodies and joints would find none.
+    if unread {
+        return None;
+    }
     touching(reader, root, options, &raw);
     raw.pairs = contact::pairs(reader, &called("contact"), &classes, &built, options);
     let mut tendons = HashMap::new();

@@ -38,6 +38,8 @@ pub(super) struct Body<'d> {
     pub sites: Vec<Part<'d>>,
     /// Its `inertial`.
     pub inertial: Option<Node<'d, 'd>>,
+    /// Whether something in it was reported that may stand for bodies and is not read.
+    pub unread: bool,
 }
 
 impl Body<'_> {
@@ -123,6 +125,7 @@ fn body<'d>(node: Node<'d, 'd>, parent: Option<usize>, pose: Pose, own_pose: Pos
         geoms: Vec::new(),
         sites: Vec::new(),
         inertial: None,
+        unread: false,
     }
 }
 
@@ -173,6 +176,7 @@ fn child<'d>(
         }
         "inertial" => all[at].inertial = Some(node),
         _ => {
+            all[at].unread = true;
             let help = REFUSED.iter().find(|(name, _)| *name == tag).map_or("remove it", |(_, help)| help);
             reader.findings.error(place(node), format!("`{tag}` is not read"), help);
         }
