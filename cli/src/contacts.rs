@@ -8,6 +8,7 @@ use std::time::Instant;
 use multibody::codegen::jit::Compiled;
 use multibody::codegen::model::ConstraintKind;
 use multibody::codegen::plan::Plan;
+use multibody::codegen::words::quote;
 use multibody::codegen::{Arithmetic, Options};
 use multibody::runtime::catalogue::BoxedMethod;
 use multibody::runtime::constrained::{Effort, Projection, WithPostStep};
@@ -16,6 +17,7 @@ use multibody::runtime::contact::{
     Regime, RegimeChange, RegimeChoice, RegimeReason, RegimeStatistics, SteppingStatistics, Stretch, WithContacts,
 };
 use multibody::runtime::integrate::{AutoSwitch, Radau5, Statistics, Step};
+use multibody::runtime::tree::Source;
 use multibody::runtime::Conjugate;
 
 use super::control::{Driven, Loads};
@@ -29,6 +31,8 @@ type System = WithContacts<Mechanism>;
 
 /// Number of events that are printed.
 const SHOWN: usize = 12;
+/// Distance beyond a stop, rad or m, from which on a joint is named: with less, a motion by events begins.
+const BEYOND: f64 = 1e-9;
 
 /// A motion with contacts.
 pub struct Touched {
@@ -218,7 +222,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
     let (q, p) = (observer.q.clone(), observer.p.clone());
     let (close, rules, start) = (projection(settings, &system), settings.regimes, (&q, &p));
     let motion = ContactMotion::new(&mut system, (method, settings.step), close, rules, 0.0, start);
-    let mut motion = motion.map_err(failed)?;
+    let mut motion = motion.map_err(|e| beyond_stops(plan, &q, &e).unwrap_or_else(|| failed(e)))?;
     motion.events.rules.order = settings.impacts;
     let mut progress = Progress::new(settings.time);
     let mut presses = Presses { pressed: vec![false; system.modes().len()], changes: Vec::new() };
@@ -285,6 +289,28 @@ fn failure(plan: &Plan, error: &HybridError) -> Failure {
             "a smaller --tolerance, or a shorter --time, shows what came before; nothing was written",
         ),
     }
+}
+
+/// The failure of a start where a joint stands beyond its stop, with all joints that do.
+fn beyond_stops(plan: &Plan, q: &[f64], error: &HybridError) -> Option<Failure> {
+    let HybridError::Overlap { contact: first, .. } = error else { return None };
+    let contacts = &plan.model.contacts;
+    contacts.get(*first)?.stop()?;
+    let beyond = contacts.iter().enumerate().filter_map(|(k, contact)| {
+        let (joint, from_below, limit) = contact.stop()?;
+        let Some(Source::State { q: at, .. }) = plan.slots.iter().find(|slot| slot.joint == joint)?.at else {
+            return None;
+        };
+        let by = if from_below { limit - q[at] } else { q[at] - limit };
+        let amount = if by < 1e-3 { format!("{by:.1e}") } else { format!("{by:.3}") };
+        let (name, end) = (quote(&plan.model.joints[joint].name), if from_below { "lower" } else { "upper" });
+        let text = format!("joint {name} stands {amount} {} beyond its {end} limit", unit(plan, k));
+        (k == *first || by > BEYOND).then_some(text)
+    });
+    Some(Failure::new(
+        format!("at the start, {}", beyond.collect::<Vec<_>>().join(", ")),
+        "give --q with positions within these limits, or change the limits; those of a URDF or an MJCF model act with --limits only",
+    ))
 }
 
 /// The name of the contact that an error states by its number, in brackets.

@@ -12,11 +12,14 @@ pub fn states_start(model: &Model) -> bool {
 
 /// The default start; `mbd simulate --help` states it.
 pub fn default_start(plan: &Plan) -> Vec<f64> {
+    let mut q = if states_start(&plan.model) { plan.start() } else { bent(plan) };
+    plan.move_into_ranges(&mut q);
+    q
+}
+
+/// Angles and displacements of which no joint is at zero.
+fn bent(plan: &Plan) -> Vec<f64> {
     let interpreter: Interpreter<f64> = plan.default_interpreter();
-    let model = &plan.model;
-    if states_start(model) {
-        return plan.start();
-    }
     let mut q = interpreter.neutral();
     let mut angle = 0.3;
     for slot in &plan.slots {
@@ -28,20 +31,6 @@ pub fn default_start(plan: &Plan) -> Vec<f64> {
             }
             [_] => q[at] = 0.05,
             _ => {}
-        }
-        if let Some([lower, upper]) = plan.model.joints[slot.joint].bounds.range {
-            if !(lower..=upper).contains(&q[at]) {
-                q[at] = match lower.is_finite() && upper.is_finite() {
-                    true => 0.5 * (lower + upper),
-                    false => {
-                        if lower.is_finite() {
-                            lower
-                        } else {
-                            upper
-                        }
-                    }
-                };
-            }
         }
     }
     q

@@ -260,6 +260,35 @@ fn robots_touch_a_floor_that_is_asked_for() {
     assert_eq!(run_in(&folder, &["check", "leg.urdf", "--friction", "0.3"]).status.code(), Some(2));
 }
 
+/// A start that nobody has stated is within the limits; of one that is not, all joints are told that stand beyond theirs.
+#[test]
+fn joints_start_between_their_stops() {
+    let folder = folder("contacts_limits");
+    let height = "<axis xyz=\"0 0 1\"/></joint>";
+    let limited = height.replace("</joint>", "<limit lower=\"-1\" upper=\"1\" effort=\"10\" velocity=\"1\"/></joint>");
+    let leg = LEG.replace("lower=\"-0.1\" upper=\"0.2\"", "lower=\"0.3\" upper=\"0.7\"").replace(height, &limited);
+    std::fs::write(folder.join("leg.urdf"), leg).expect("a file");
+    let simulate = |more: &[&str]| {
+        let arguments = ["simulate", "leg.urdf", "--time", "0.1", "--columns", "q.height,q.knee"];
+        run_in(&folder, &[&arguments[..], more].concat())
+    };
+    for more in [&["--limits"][..], &["--limits", "--floor", "-2"], &["--floor", "-2", "--self-contact"]] {
+        good(simulate(more));
+        let table = std::fs::read_to_string(folder.join("leg.csv")).expect("a table");
+        assert_eq!(table.lines().nth(1), Some("0,0,0.5"), "{more:?}");
+    }
+    bad(
+        simulate(&["--limits", "--q", "2,0"]),
+        &[
+            "at the start, joint `height` stands 1.000 m beyond its upper limit, joint `knee` stands 0.300 m beyond its lower \
+             limit\n",
+            "help: give --q with positions within these limits",
+        ],
+    );
+    // A stop is still one where its joint stands at it.
+    good(simulate(&["--limits", "--q", "1,0.3"]));
+}
+
 /// Two rods that hang beside each other.
 fn arms() -> String {
     let arm = |name: &str, x: f64| {

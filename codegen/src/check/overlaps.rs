@@ -25,7 +25,8 @@ pub(super) fn overlapping(model: &Model, candidates: &[Candidate]) -> Vec<bool> 
         return Vec::new();
     }
     let mut trial = model.clone();
-    trial.contacts.clear();
+    // Stops bound where it starts.
+    trial.contacts.retain(|contact| contact.stop().is_some());
     let frame = |shape: &crate::model::Shape| {
         let mount = &shape.mount;
         Frame { name: shape.name.clone(), body: mount.body, placement: mount.placement }
@@ -33,12 +34,18 @@ pub(super) fn overlapping(model: &Model, candidates: &[Candidate]) -> Vec<bool> 
     trial.frames = model.shapes.iter().map(frame).collect();
     let plan = Plan::new(&trial, PlanOptions::default().snap);
     let params = plan.default_params();
-    let mut q = plan.start();
-    if !plan.constraints.is_empty() {
+    let mut starts = vec![plan.start()];
+    // Where the description states none, a motion may start within the ranges of the joints as well.
+    let mut moved = starts[0].clone();
+    plan.move_into_ranges(&mut moved);
+    if moved != starts[0] {
+        starts.push(moved);
+    }
+    for q in starts.iter_mut().filter(|_| !plan.constraints.is_empty()) {
         let mut closed = q.clone();
         // A loop that does not close is reported by whoever starts a motion there.
         if close(&mut plan.interpreter::<f64>(&params), &mut closed, &Closing::holding(&plan.held())).is_ok() {
-            q = closed;
+            *q = closed;
         }
     }
     let (mut overlaps, mut rest) = (Vec::with_capacity(candidates.len()), candidates);
@@ -49,34 +56,37 @@ pub(super) fn overlapping(model: &Model, candidates: &[Candidate]) -> Vec<bool> 
         }
         let (these, others) = rest.split_at(count);
         trial.contacts = these.iter().flat_map(|candidate| candidate.contacts.iter().cloned()).collect();
-        overlaps.extend(overlapping_at(&q, &trial, these));
+        overlaps.extend(overlapping_at(&starts, &trial, these));
         rest = others;
     }
     overlaps
 }
 
-/// The same at these coordinates, for a model that has the contacts of the pairs, and a frame on each shape.
-fn overlapping_at(q: &[f64], model: &Model, candidates: &[Candidate]) -> Vec<bool> {
+/// The same at any of these coordinates, for a model that has the contacts of the pairs, and a frame on each shape.
+fn overlapping_at(starts: &[Vec<f64>], model: &Model, candidates: &[Candidate]) -> Vec<bool> {
     let plan = Plan::new(model, PlanOptions::default().snap);
     let params = plan.default_params();
     let mut full = plan.with_contacts().interpreter::<f64>(&params);
     let (mut residuals, mut entries) = (full.zero_rows(), full.zero_entries());
-    full.residuals(q, &mut residuals, &mut entries);
-    // Those of the bodies come first.
     let mut all = vec![FrameState::ground(); full.tree().frames.len()];
-    full.frames(q, &vec![0.0; plan.dims.nv], &mut all);
-    let frames = &all[all.len().saturating_sub(model.frames.len())..];
     let rows = plan.contacts::<f64>();
-    let mut first = 0;
-    let overlaps = |candidate: &Candidate| {
-        let own = &rows[first..first + candidate.contacts.len()];
-        first += candidate.contacts.len();
-        let [a, b] = candidate.shapes;
-        own.iter().any(|contact| residuals[contact.row] < -ROUNDING)
-            || pierces([&model.shapes[a].kind, &model.shapes[b].kind], [&frames[a], &frames[b]])
-            || pierces([&model.shapes[b].kind, &model.shapes[a].kind], [&frames[b], &frames[a]])
-    };
-    candidates.iter().map(overlaps).collect()
+    let mut found = vec![false; candidates.len()];
+    for q in starts {
+        full.residuals(q, &mut residuals, &mut entries);
+        full.frames(q, &vec![0.0; plan.dims.nv], &mut all);
+        // Those of the bodies come first.
+        let frames = &all[all.len().saturating_sub(model.frames.len())..];
+        let mut first = 0;
+        for (found, candidate) in found.iter_mut().zip(candidates) {
+            let own = &rows[first..first + candidate.contacts.len()];
+            first += candidate.contacts.len();
+            let [a, b] = candidate.shapes;
+            *found |= own.iter().any(|contact| residuals[contact.row] < -ROUNDING)
+                || pierces([&model.shapes[a].kind, &model.shapes[b].kind], [&frames[a], &frames[b]])
+                || pierces([&model.shapes[b].kind, &model.shapes[a].kind], [&frames[b], &frames[a]]);
+        }
+    }
+    found
 }
 
 /// Whether the line of a capsule goes through the second shape from side to side. Its ends are then outside, and the edges

@@ -12,6 +12,7 @@ mod frames;
 mod instantiate;
 mod paths;
 mod placement;
+mod ranges;
 mod rigid;
 mod row_order;
 mod shared;

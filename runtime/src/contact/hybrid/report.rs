@@ -168,7 +168,7 @@ impl core::fmt::Display for HybridError {
             HybridError::Contact { time, error } => write!(f, "at t = {time} s: {error}"),
             HybridError::Overlap { contact, gap } => write!(
                 f,
-                "contact {contact} starts with a gap of {gap:.3e}: the bodies overlap; start where they are apart or touch"
+                "contact {contact} starts with a gap of {gap:.3e}: the bodies overlap, or the joint is beyond its stop; start where they are apart or touch, or within the limits"
             ),
             HybridError::TooManyEvents { time, events } => write!(
                 f,

@@ -1,0 +1,127 @@
+//! Positions within the ranges of their joints, for a start that nobody has stated.
+
+use mbd_runtime::tree::Source;
+
+use super::Plan;
+use crate::model::{ConstraintKind, Contact, JointMotion, Model};
+
+impl Plan {
+    /// Moves coordinates that are outside of the range of their joint, or beyond its stops, to the middle of it; to its end where
+    /// it has only one. Nothing moves where the model states a `start`, and joints that are part of a loop stay where they are,
+    /// because loops are often described as closed there.
+    ///
+    /// [`Plan::start`] does not do so: it is what the description says.
+    pub fn move_into_ranges(&self, q: &mut [f64]) {
+        if !self.model.starts.is_empty() {
+            return;
+        }
+        let (ranges, stay) = (ranges(&self.model), in_loops(&self.model));
+        for slot in &self.slots {
+            let Some(Source::State { q: at, .. }) = slot.at else { continue };
+            let ([lower, upper], Some(q)) = (ranges[slot.joint], q.get_mut(at)) else { continue };
+            if stay[slot.joint] || lower > upper || (lower..=upper).contains(&*q) {
+                continue;
+            }
+            *q = match [lower, upper].map(f64::is_finite) {
+                [true, true] => 0.5 * (lower + upper),
+                [true, false] => lower,
+                [false, _] => upper,
+            };
+        }
+    }
+}
+
+/// What each joint may do by its range and by its stops; all that there is where it has none.
+fn ranges(model: &Model) -> Vec<[f64; 2]> {
+    let all = [f64::NEG_INFINITY, f64::INFINITY];
+    let mut ranges: Vec<[f64; 2]> = model.joints.iter().map(|joint| joint.bounds.range.unwrap_or(all)).collect();
+    for (joint, from_below, limit) in model.contacts.iter().filter_map(Contact::stop) {
+        let [lower, upper] = &mut ranges[joint];
+        match from_below {
+            true => *lower = lower.max(limit),
+            false => *upper = upper.min(limit),
+        }
+    }
+    ranges
+}
+
+/// Which joints are part of a loop, themselves or by joints that follow them.
+fn in_loops(model: &Model) -> Vec<bool> {
+    let mut above = vec![None; model.bodies.len()];
+    for (k, joint) in model.joints.iter().enumerate() {
+        above[joint.child] = Some(k);
+    }
+    let mut found = vec![false; model.joints.len()];
+    for constraint in &model.constraints {
+        let ConstraintKind::Loop { first, second, .. } = &constraint.kind else { continue };
+        // Joints above both bodies do not belong to the loop.
+        let mut passed = vec![false; model.joints.len()];
+        for mount in [first, second] {
+            let mut body = mount.body;
+            while let Some(joint) = body.and_then(|body| above[body]) {
+                passed[joint] = !passed[joint];
+                body = model.joints[joint].parent;
+            }
+        }
+        found.iter_mut().zip(passed).for_each(|(found, passed)| *found |= passed);
+    }
+    for k in 0..found.len() {
+        let mut follower = k;
+        while let (true, JointMotion::Mimic { leader, .. }) = (found[k], &model.joints[follower].motion) {
+            found[*leader] = true;
+            follower = *leader;
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::read::{self, ImportOptions};
+
+    /// Coordinates of a four-bar linkage at zero beside a slide and a door, in which they move, by name.
+    fn moved(four_bar: &str) -> Vec<(String, f64)> {
+        let text = four_bar.replace("name = \"crank_pin\"", "name = \"crank_pin\"\nrange = [1, 2]")
+            + "
+[[body]]
+name = \"slide\"
+mass = 1
+
+[[joint]]
+name = \"track\"
+type = \"prismatic\"
+child = \"slide\"
+axis = [1, 0, 0]
+range = [1, 2]
+
+[[body]]
+name = \"door\"
+mass = 1
+inertia = [1, 1, 1]
+
+[[joint]]
+name = \"hinge\"
+type = \"revolute\"
+child = \"door\"
+axis = [0, 0, 1]
+limits = { upper = -1 }
+";
+        let model = read::model("fourbar.toml", &text, &ImportOptions::default()).expect("a model").model;
+        let plan = Plan::new(&model, 1e-9);
+        let mut q = vec![0.0; plan.dims.nq];
+        plan.move_into_ranges(&mut q);
+        let moved = plan.coordinate_names().into_iter().zip(q).filter(|(_, q)| *q != 0.0);
+        moved.collect()
+    }
+
+    /// The middle of a range, the one end of limits; but no joint of a loop, and nothing where a start is stated.
+    #[test]
+    fn positions_move_into_ranges() {
+        let stated = include_str!("../../../models/mechanisms/fourbar.toml");
+        assert!(moved(stated).is_empty(), "{:?}", moved(stated));
+        let open = stated.lines().filter(|line| !line.starts_with("start") && !line.starts_with("held"));
+        let open: String = open.map(|line| format!("{line}\n")).collect();
+        assert_eq!(moved(&open), [("track".to_string(), 1.5), ("hinge".to_string(), -1.0)]);
+    }
+}
