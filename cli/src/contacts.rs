@@ -101,6 +101,10 @@ struct Observer {
     visits: Vec<(Vec<Mode>, f64)>,
     /// Forces of the contacts at the rows, where they are kept.
     forces: Option<Vec<Vec<[f64; 3]>>>,
+    /// A copy in which they are computed, once there is one.
+    aside: Option<System>,
+    /// Whether rows are missing because of an interrupt.
+    cut: bool,
     every: f64,
     time: f64,
     q: Vec<f64>,
@@ -121,8 +125,11 @@ impl Observer {
 
     fn row(&mut self, system: &mut System, t: f64) {
         if let Some(kept) = &mut self.forces {
-            // In a copy: nothing of the motion depends on whether it is drawn.
-            kept.push(system.clone().forces(t, &self.q, &self.p).to_vec());
+            // In a copy: nothing of the motion depends on whether it is drawn. There is one for all rows, because making it
+            // takes far longer than the forces where there are many contacts.
+            let aside = self.aside.get_or_insert_with(|| system.clone());
+            aside.take_modes_of(system);
+            kept.push(aside.forces(t, &self.q, &self.p).to_vec());
         }
         let (mechanism, record) = (system.system_mut(), &mut self.record);
         let mut v = vec![0.0; self.p.len()];
@@ -154,6 +161,10 @@ impl ContactObserver<Mechanism> for Observer {
             None => self.visits.push((system.modes().to_vec(), end - begin)),
         }
         while self.next() <= end && self.record.t.last().is_some_and(|last| *last < self.time) {
+            if interrupt::asked() {
+                self.cut = true;
+                break;
+            }
             let t = self.next();
             let (mut q, mut p) = (std::mem::take(&mut self.q), std::mem::take(&mut self.p));
             stretch.state(system, t, &mut q, &mut p);
@@ -212,6 +223,8 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
         changes: Vec::new(),
         visits: Vec::new(),
         forces: with_forces.then(Vec::new),
+        aside: None,
+        cut: false,
         every: settings.every,
         time: settings.time,
         q,
@@ -243,7 +256,10 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
         }
     }
     progress.clear();
-    observer.record.interrupted = (motion.time() < settings.time).then_some(motion.time());
+    observer.record.interrupted = match observer.cut {
+        true => observer.record.t.last().copied(),
+        false => (motion.time() < settings.time).then_some(motion.time()),
+    };
     let statistics: Statistics = motion.integration_statistics();
     let (modes, count) = (system.modes().iter().copied().enumerate(), system.modes().len());
     Ok(Touched {

@@ -167,11 +167,18 @@ fn feet_that_begin_to_slip_at_once_slide() {
         let mut scene = begun("quadruped_hop");
         scene.tolerance = tolerance;
         let (mut t, mut together) = (0.0, 0);
+        let mut aside = scene.system.clone();
         while t < 0.04 {
             scene.advance(0.04);
             t = scene.motion.as_ref().expect("it has begun").time();
             let modes = scene.system.modes().to_vec();
             let forces = scene.system.clone().forces(t, &scene.q, &scene.p).to_vec();
+            // One copy that takes the modes over does as well as a new one at every state.
+            aside.take_modes_of(&scene.system);
+            assert_eq!(aside.modes(), modes);
+            let total = |forces: &[[f64; 3]]| forces.iter().map(|force| force[0]).sum::<f64>();
+            let (own, copied) = (total(&forces), total(aside.forces(t, &scene.q, &scene.p)));
+            assert!((own - copied).abs() < 1e-6, "{t} s: {own} N and {copied} N");
             for (contact, (mode, [normal, x, y])) in
                 scene.system.system().contacts().iter().zip(modes.iter().zip(&forces))
             {

@@ -187,6 +187,18 @@ impl<Y: Touching> WithContacts<Y> {
         self.at.forces.as_ref()
     }
 
+    /// Takes the modes of the contacts over from another evaluator of the same mechanism, with all that their forces depend on
+    /// beside the state and the inputs: [`WithContacts::forces`] are then those of the other one, as far as they are searched. A
+    /// copy that follows a motion in this way changes nothing of it, and takes far less time than a new copy at every state.
+    pub fn take_modes_of(&mut self, other: &Self) {
+        copy(self.modes.as_mut(), other.modes.as_ref());
+        copy(self.slip.as_mut(), other.slip.as_ref());
+        copy(self.begins.as_mut(), other.begins.as_ref());
+        copy(self.grip.as_mut(), other.grip.as_ref());
+        (self.redundant, self.shares) = (other.redundant, other.shares);
+        self.modes_are_set();
+    }
+
     /// Sets the modes and the directions of slip.
     pub(super) fn set_modes(&mut self, found: &Touches<Y>) {
         copy(self.modes.as_mut(), found.modes.as_ref());
