@@ -13,14 +13,14 @@ use multibody::runtime::catalogue::{self, BoxedMethod};
 use multibody::runtime::constrained::{
     ConstraintError, Effort, PostStep, Projection, SingularPosition, Stabilisation, WithPostStep,
 };
-use multibody::runtime::contact::{ImpactOrder, RegimeRules};
+use multibody::runtime::contact::{ImpactOrder, RegimeChoice, RegimeRules};
 use multibody::runtime::integrate::{Control, EnergyProjection, Solver, Statistics, Step, StepError};
 use multibody::runtime::{Constrained, Differentiable, Interpreter, Real, Scalar, System};
 
 use super::control::{Controller, Driven, Loads};
 use super::energy::Balance;
 use super::interrupt;
-use super::output::mentioned;
+use super::output::{mentioned, note};
 use super::timed::Timed;
 use super::{loops, source, Failure, Outcome};
 
@@ -76,6 +76,11 @@ impl Settings<'_> {
             .ok_or_else(|| Failure::new(format!("no method `{}`", self.method), "mbd simulate --help lists them"))
     }
 
+    /// Whether steps are chosen by their error.
+    pub fn is_adaptive(&self) -> bool {
+        self.regimes.choice != RegimeChoice::TimeSteps && matches!(self.step, Step::Adaptive(_))
+    }
+
     /// What the ends of steps may do.
     fn effort(&self) -> Effort {
         match self.step {
@@ -87,6 +92,10 @@ impl Settings<'_> {
 
 /// Number of singular positions that are shown.
 const SHOWN: usize = 4;
+/// Steps after which the pace of a run is known.
+const KNOWN: u64 = 20_000;
+/// Steps of a whole run from which on they are said to be many.
+const MANY: f64 = 1e7;
 
 /// Record of a simulation.
 #[derive(Default)]
@@ -107,6 +116,8 @@ pub struct Record {
     pub loads: Loads,
     /// Time at which the run was interrupted, s.
     pub interrupted: Option<f64>,
+    /// Why the run would take very many steps, and what to do about it, where that was told.
+    pub crawls: Option<[String; 2]>,
     /// Energy at the ends of steps, which has the error of the method without that of the dense output.
     pub ends: Ends,
     /// Evaluations, steps and rejections.
@@ -379,7 +390,7 @@ fn go(
     let (time, every) = (settings.time, settings.every);
     let rows = (time / every * (1.0 - 1e-12)).ceil().max(1.0) as u64;
     let at = |row: u64| if row < rows { row as f64 * every } else { time };
-    let (mut row, mut progress) = (1, Progress::new(time));
+    let (mut row, mut steps, mut progress) = (1, 0_u64, Progress::new(time));
     let (mut q, mut p) = (observer.record.q[0].clone(), observer.record.p[0].clone());
     let mut instants = settings.instants().into_iter();
     let mut until = instants.next().unwrap_or(time);
@@ -428,10 +439,41 @@ fn go(
             }
         }
         observer.record.spent.output += clock.elapsed().as_secs_f64();
+        steps += 1;
+        if observer.record.crawls.is_none() {
+            observer.record.crawls = crawls(settings, steps, end);
+            if let Some([what, help]) = &observer.record.crawls {
+                progress.clear();
+                note(format_args!("hint: {what}\n  help: {help}"));
+            }
+        }
         progress.show(end);
     }
     progress.clear();
     Ok(())
+}
+
+/// What is told of a run by an explicit method that chooses steps so small that it would need very many of them, and what to do.
+fn crawls(settings: &Settings, steps: u64, t: f64) -> Option<[String; 2]> {
+    if steps < KNOWN || !settings.is_adaptive() || !settings.is_explicit() {
+        return None;
+    }
+    let all = steps as f64 * (settings.time / t);
+    if all <= MANY {
+        return None;
+    }
+    let what = format!(
+        "{steps} steps have led to {t:.1e} s: a step is {:.1e} s on the average, and {} s would take {all:.0e} of them. Unless \
+         the mechanism moves as fast as that, the model is stiff or nearly singular",
+        t / steps as f64,
+        settings.time
+    );
+    let take = "take `--method rodas5p` or `--method radau5`, which need few steps for such models";
+    let help = match settings.control.as_ref().is_some_and(|control| !control.has_derivatives()) {
+        true => format!("leave --gravity-compensation out, and {take}"),
+        false => take.to_string(),
+    };
+    Some([what, help])
 }
 
 /// The failure of a run that did not reach its end: what happened, when, and what to do.

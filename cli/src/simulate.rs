@@ -165,6 +165,9 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
         }
     }
     writeln!(out, "work: {}", work(&record.statistics))?;
+    if let (Some(_), Some([what, help])) = (record.interrupted, &record.crawls) {
+        writeln!(out, "hint: {what}; {help}")?;
+    }
     writeln!(out, "time: {}", spent(record.interrupted.unwrap_or(args.motion.time), &record.spent))?;
     writeln!(out, "table: {} ({} rows)\nplot: {}", csv.display(), record.t.len(), svg.display())?;
     if let Some(file) = &args.picture {

@@ -251,3 +251,39 @@ fn eval_scales_quaternions_and_knows_the_condition() {
     assert!(evaluated.contains("`second`") && evaluated.contains("help: "), "{evaluated}");
     assert!(simulated.contains("warning: at the start, the mass matrix has condition 5."), "{simulated}");
 }
+
+/// A damper that takes the velocity within 1e-8 s lets an explicit method take steps of that length only: the run would have
+/// 1e8 of them or more, which it tells after the first ones and when it is interrupted.
+#[cfg(unix)]
+#[test]
+fn a_run_that_crawls_says_why() {
+    use std::io::{BufRead, BufReader};
+    use std::process::{Command, Stdio};
+
+    let folder = folder("trust_crawls");
+    let model = single("type = \"prismatic\"\naxis = [1, 0, 0]\nstiffness = 400\ndamping = 1e8", "");
+    let model = write(&folder, "damped.toml", &model);
+    let start = ["--q", "0.1", "--v", "0"];
+    let arguments = [&["simulate", &model, "--csv", "a.csv", "--svg", "a.svg"], &start[..]].concat();
+    let mut command = Command::new(PROGRAM);
+    command.current_dir(&folder).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the program runs");
+    let messages = BufReader::new(child.stderr.take().expect("messages"));
+    let mut lines = messages.lines().map(|line| line.expect("UTF-8"));
+    let hint = lines.find(|line| line.starts_with("hint: ")).expect("a hint");
+    assert!(hint.contains("20000 steps have led to ") && hint.contains("stiff or nearly singular"), "{hint}");
+    let help = lines.next().expect("help");
+    assert!(help.starts_with("  help: take `--method rodas5p` or `--method radau5`"), "{help}");
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(kill.expect("kill").success());
+    // It is told once.
+    let rest: Vec<String> = lines.collect();
+    assert!(!rest.iter().any(|line| line.contains("hint")), "{rest:?}");
+    let output = child.wait_with_output().expect("an end");
+    assert_eq!(output.status.code(), Some(130), "{rest:?}");
+    let report = out(&output);
+    assert!(report.contains(&format!("\n{hint}; {}\n", help.trim_start_matches("  help: "))), "{report}");
+    // The same by a method that is made for it.
+    let (code, report, messages) = simulate(&folder, &model, &[&start[..], &["--method", "rodas5p"]].concat());
+    assert!(code == Some(0) && !messages.contains("hint"), "{report}{messages}");
+}
