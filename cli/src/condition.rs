@@ -8,6 +8,17 @@ pub const LARGEST: usize = 1000;
 /// Relative error at which not even the first digit of a result is known.
 const NO_DIGIT: f64 = 0.1;
 
+/// What the condition of a mass matrix takes from velocities and accelerations.
+pub struct Doubt {
+    /// What is wrong.
+    pub what: String,
+    /// What to do about it.
+    pub help: String,
+    /// Whether the matrix is singular but for rounding: also where entries err by one rounding and not by `n`. The bound with
+    /// `n` doubts a sound chain of 900 links.
+    pub singular: bool,
+}
+
 /// Condition of the mass matrix `M` (`n × n`, row by row) in the norm of row sums, after scaling rows and columns so
 /// that the diagonal is one: units and sizes of the coordinates do not matter then, and no scaling of rows and columns
 /// has a condition more than `n` times smaller (van der Sluis, Numer. Math. 14, 1969). Infinite where rounding has left
@@ -49,13 +60,13 @@ fn condition(m: &[f64], n: usize) -> (f64, usize) {
     (norm * largest_sum(&inverse), least.1)
 }
 
-/// What the mass matrix, which `matrix` writes row by row, leaves of the digits of velocities and accelerations: a
-/// warning and its help, where that is none. Large matrices are not looked at.
+/// What the mass matrix, which `matrix` writes row by row, leaves of the digits of velocities and accelerations, where that is
+/// none. Large matrices are not looked at.
 ///
 /// The numbers of a model are known to a rounding, and so are the entries of `M`: relative to the scaled matrix, an
 /// error of at most `n ε` in the norm of row sums. The solution of `M v = p` then changes by `n ε κ` of its size to
 /// first order, whatever the algorithm (Higham, *Accuracy and Stability of Numerical Algorithms*, 2002, section 7.1).
-pub fn of_mass_matrix(plan: &Plan, matrix: impl FnOnce(&mut [f64])) -> Option<(String, String)> {
+pub fn of_mass_matrix(plan: &Plan, matrix: impl FnOnce(&mut [f64])) -> Option<Doubt> {
     let n = plan.dims.nv;
     if n == 0 || n > LARGEST {
         return None;
@@ -71,7 +82,8 @@ pub fn of_mass_matrix(plan: &Plan, matrix: impl FnOnce(&mut [f64])) -> Option<(S
         "the mass matrix has condition {condition:.1e} (scaled to a unit diagonal): rounding leaves no digit of velocities \
          and accelerations; the others nearly determine `{name}`"
     );
-    Some((what, format!("compare the masses and inertias that `{name}` moves with the others, or give it an armature")))
+    let help = format!("compare the masses and inertias that `{name}` moves with the others, or give it an armature");
+    Some(Doubt { what, help, singular: f64::EPSILON * condition > NO_DIGIT })
 }
 
 /// The coordinate whose neighbours among the doubles are farthest away: its name, and that distance, rad or m.

@@ -51,7 +51,7 @@ pub fn run(args: &ModesArgs, out: &mut dyn Write) -> Outcome {
     writable(&file)?;
     let (q, v, _) = simulate::start_closed(&plan, &args.motion)?;
     let settings = simulate::controlled(&plan, &args.motion, settings, &q)?;
-    verdict::start(&args.motion.model.model, &plan, &q)?;
+    verdict::start(&args.motion.model.model, &plan, &q, settings.is_adaptive())?;
     let touched = contacts::simulate(&plan, (q, v), &settings, false)?;
     write_files(&[(file.as_path(), modes::text(model, &touched.visits).as_str())])?;
     writeln!(out, "{}", simulate::title(&plan, &settings))?;

@@ -507,6 +507,9 @@ fn failure(plan: &Plan, settings: &Settings, e: &StepError) -> Failure {
                 "the step was {h} s: lower --step, or leave it out for steps by the error{before}; nothing was written"
             )
         }
+        (StepError::StepTooSmall { error, .. }, Step::Adaptive(_)) if !error.is_finite() => {
+            format!("the state is singular there, or too large for doubles: look at --q and --v, and at masses and inertias near zero{before}; nothing was written")
+        }
         (StepError::NotFinite { .. }, Step::Adaptive(_)) => {
             format!("the state is singular there, or too large for doubles: look at --q and --v{before}; nothing was written")
         }

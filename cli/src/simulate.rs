@@ -116,7 +116,7 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
         let others: Vec<&PathBuf> = [&csv, &svg].into_iter().chain(&args.picture).collect();
         of_its_own(("--record-modes", file), "another result", &others)?;
     }
-    verdict::start(path, &plan, &q)?;
+    verdict::start(path, &plan, &q, settings.is_adaptive())?;
     let of_contacts = [
         ("--record-modes", args.record_modes.is_some()),
         ("--contacts", args.motion.contacts != ContactRegime::Events),

@@ -5,12 +5,12 @@ use std::path::Path;
 use multibody::codegen::plan::Plan;
 use multibody::runtime::integrate::Step;
 
-use super::condition;
+use super::condition::{self, Doubt};
 use super::energy::Verdict;
 use super::motion::{interpreter, Record, Settings};
 use super::output::note;
 use super::probe::Probe;
-use super::{Failure, Outcome};
+use super::{source, Failure, Outcome};
 
 /// Tolerances from here on leave no digit: momenta are then wrong by their own size in every step.
 pub const MEANINGLESS: f64 = 1.0;
@@ -23,11 +23,11 @@ fn warn(path: &Path, what: &str, help: &str) {
     note(format_args!("{}: warning: {what}\n  help: {help}", path.display()));
 }
 
-/// Looks at the start of a run.
+/// Looks at the start of a run, whose steps are chosen by their error or not.
 ///
 /// # Errors
-/// Coordinates without digits.
-pub fn start(path: &Path, plan: &Plan, q: &[f64]) -> Outcome {
+/// Coordinates without digits. Steps by the error where the mass matrix is singular but for rounding: no step is small enough.
+pub fn start(path: &Path, plan: &Plan, q: &[f64], adaptive: bool) -> Outcome {
     if let Some((name, apart)) = condition::spacing(plan, q).filter(|s| s.1 >= APART) {
         let what =
             format!("the start has no digits: doubles near the value of `{name}` are {apart:.1e} rad or m apart");
@@ -41,8 +41,16 @@ pub fn start(path: &Path, plan: &Plan, q: &[f64]) -> Outcome {
         ));
     }
     let mut interpreter = interpreter::<f64>(plan);
-    if let Some((what, help)) = condition::of_mass_matrix(plan, |m| interpreter.mass_matrix(q, m)) {
-        warn(path, &format!("at the start, {what}"), &help);
+    if let Some(Doubt { what, help, singular }) = condition::of_mass_matrix(plan, |m| interpreter.mass_matrix(q, m)) {
+        let what = format!("at the start, {what}");
+        if singular && adaptive {
+            interpreter.check_rank(q).map_err(|e| source::rank_failure(&e))?;
+            return Err(Failure::new(
+                format!("{what}; no step has an error that could be allowed"),
+                format!("{help}; with fixed steps (--step) a motion is computed all the same"),
+            ));
+        }
+        warn(path, &what, &help);
     }
     Ok(())
 }

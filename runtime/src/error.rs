@@ -146,6 +146,9 @@ impl StepError {
             StepError::Quaternion { time, index, norm } => {
                 write!(f, "the quaternion at q[{index}] has norm {norm} at t = {time} s: give one of unit length")
             }
+            StepError::StepTooSmall { time, step, error } if !error.is_finite() => {
+                write!(f, "the step fell to {step:e} s at t = {time} s, because rates in it are not finite: look for a singular configuration, or for masses and inertias near zero")
+            }
             StepError::StepTooSmall { time, step, error } => {
                 write!(f, "the step fell to {step:e} s at t = {time} s with {error:.1e} times the allowed error: loosen the tolerances, or take an implicit method")
             }
@@ -383,6 +386,17 @@ mod tests {
         fn rates_at(&mut self, _: f64, _: &[f64; 2], _: &[f64; 2], _: &mut [f64; 2], _: &mut [f64; 2]) {}
 
         fn coordinate_rates(&self, _: &[f64; 2], _: &[f64; 2], _: &mut [f64; 2]) {}
+    }
+
+    #[test]
+    fn a_step_that_is_too_small_says_why() {
+        let message = |error: f64| StepError::StepTooSmall { time: 0.0, step: 1e-16, error }.to_string();
+        assert!(message(2.0).contains("with 2.0e0 times the allowed error: loosen the tolerances"));
+        for error in [f64::NAN, f64::INFINITY] {
+            let message = message(error);
+            assert!(message.contains("because rates in it are not finite: look for a singular"), "{message}");
+            assert!(!message.contains("NaN") && !message.contains("inf") && !message.contains("loosen"), "{message}");
+        }
     }
 
     #[test]

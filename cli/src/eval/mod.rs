@@ -167,8 +167,8 @@ fn evaluate(
         state.apply(mechanism.inputs());
         if needs_rank {
             mechanism.inputs().check_rank(&state.q).map_err(|e| (k, source::rank_failure(&e)))?;
-            if let Some((what, help)) = condition::of_mass_matrix(plan, |m| mechanism.mass_matrix(&state.q, m)) {
-                note(format_args!("states[{k}]: warning: {what}\n  help: {help}"));
+            if let Some(doubt) = condition::of_mass_matrix(plan, |m| mechanism.mass_matrix(&state.q, m)) {
+                note(format_args!("states[{k}]: warning: {}\n  help: {}", doubt.what, doubt.help));
             }
         }
         for open in loops::violated(plan, mechanism, &state.q, &state.v) {

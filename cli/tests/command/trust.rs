@@ -230,7 +230,7 @@ fn eval_scales_quaternions_and_knows_the_condition() {
     }
     // Two sliders on one line: the condition is (1 + c)/(1 - c), c² = 1/(1 + m), about 4/m for a small mass m of the
     // first.
-    let sliders = |m: f64| {
+    let sliders = |m: f64, more: &[&str]| {
         let slider = "type = \"prismatic\"\naxis = [1, 0, 0]";
         let text = format!(
             "name = \"sliders\"\n[[body]]\nname = \"a\"\nmass = {m:e}\n[[body]]\nname = \"b\"\nmass = 1\n[[joint]]\nname = \
@@ -239,17 +239,26 @@ fn eval_scales_quaternions_and_knows_the_condition() {
         let model = write(&folder, "sliders.toml", &text);
         let input = write(&folder, "s.json", "{\"states\": [{\"q\": [0, 0], \"v\": [1, 1]}]}");
         let output = good(run(&["eval", &model, "--input", &input]));
-        let simulated = good(run_in(&folder, &["simulate", &model, "--time", "0.01", "--rows", "1"]));
-        (err(&output).to_string(), err(&simulated).to_string())
+        let arguments = ["simulate", &model, "--time", "0.01", "--rows", "1"];
+        (err(&output).to_string(), run_in(&folder, &[&arguments[..], more].concat()))
     };
     // The threshold is 0.1/(2 ε), 2.3e14.
-    for text in [sliders(1e-12).0, sliders(1e-12).1] {
-        assert_eq!(text, "");
-    }
-    let (evaluated, simulated) = sliders(2.0_f64.powi(-47));
-    assert!(evaluated.contains("states[0]: warning: the mass matrix has condition 5."), "{evaluated}");
+    let (evaluated, simulated) = sliders(1e-12, &[]);
+    let simulated = good(simulated);
+    assert_eq!((evaluated.as_str(), err(&simulated)), ("", ""));
+    let (evaluated, simulated) = sliders(2.0_f64.powi(-46), &[]);
+    assert!(evaluated.contains("states[0]: warning: the mass matrix has condition 2."), "{evaluated}");
     assert!(evaluated.contains("`second`") && evaluated.contains("help: "), "{evaluated}");
-    assert!(simulated.contains("warning: at the start, the mass matrix has condition 5."), "{simulated}");
+    let simulated = good(simulated);
+    let messages = err(&simulated);
+    assert!(messages.contains("warning: at the start, the mass matrix has condition 2."), "{messages}");
+    // From 0.1/ε on, 4.5e14, steps have no error that means anything.
+    let (_, simulated) = sliders(2.0_f64.powi(-47), &[]);
+    bad(simulated, &["error: at the start, the mass matrix has condition 5.", "`second`", "fixed steps (--step)"]);
+    let (evaluated, simulated) = sliders(2.0_f64.powi(-47), &["--step", "0.001"]);
+    assert!(evaluated.contains("states[0]: warning: the mass matrix has condition 5."), "{evaluated}");
+    let messages = err(&simulated);
+    assert!(messages.contains("warning: at the start, the mass matrix has condition 5."), "{messages}");
 }
 
 /// A damper that takes the velocity within 1e-8 s lets an explicit method take steps of that length only: the run would have
