@@ -263,7 +263,8 @@ pub fn violated(plan: &Plan, mechanism: &mut Compiled, q: &[f64], v: &[f64]) -> 
         }
         if fast > MOST * scale {
             out.push(format!(
-                "`v` breaks {word} `{name}` by {fast:.1e}; `qd` and `pd` are those of the nearest velocities it allows"
+                "`v` breaks {word} `{name}` by {fast:.1e}; `qd`, `pd` and `kinetic` are those of the nearest velocities it \
+                 allows"
             ));
         }
     }

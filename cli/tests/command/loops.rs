@@ -136,4 +136,16 @@ fn evaluates() {
     assert!(!messages.contains("states[0]"), "{messages}");
     assert!(messages.contains("states[1]: warning: `q` leaves loop `closing_pin` open by "), "{messages}");
     assert!(messages.contains("states[1]: warning: `v` breaks loop `closing_pin` by "), "{messages}");
+    assert!(
+        messages.contains("; `qd`, `pd` and `kinetic` are those of the nearest velocities it allows"),
+        "{messages}"
+    );
+    // The nearest velocities in the metric of the mass matrix have no more kinetic energy than those that were given.
+    let other = &results["states"][1];
+    let m: Vec<Vec<f64>> = serde_json::from_value(other["M"].clone()).expect("a matrix");
+    let given = 0.5 * m.iter().flatten().sum::<f64>();
+    let qd: Vec<f64> = serde_json::from_value(other["qd"].clone()).expect("rates");
+    let nearest = 0.5 * (0..3).map(|i| qd[i] * (0..3).map(|k| m[i][k] * qd[k]).sum::<f64>()).sum::<f64>();
+    let kinetic = other["kinetic"].as_f64().expect("a number");
+    assert!((kinetic - nearest).abs() < 1e-12 && kinetic < given - 1e-6, "{kinetic} {nearest} {given}");
 }
