@@ -31,6 +31,8 @@ use super::{
 /// the end was 4 to 160 times below that of `dop853` at this tolerance, for at most a sixth more evaluations.
 const METHOD: &str = "verner9";
 const TOLERANCE: f64 = 1e-9;
+/// Default time step of contacts, s; the help of `--contact-step` states it.
+const CONTACT_STEP: f64 = 1e-3;
 /// Default number of rows of the table.
 const ROWS: u64 = 1000;
 /// Limit of the number of steps.
@@ -346,11 +348,18 @@ pub fn settings(args: &MotionArgs) -> Outcome<Settings<'_>> {
 
 /// How contacts are followed.
 fn regimes(args: &MotionArgs) -> Outcome<RegimeRules> {
+    let step = args.contact_step.unwrap_or(CONTACT_STEP);
     let choice = match args.contacts {
         ContactRegime::Events => RegimeChoice::Events,
         ContactRegime::Stepping => RegimeChoice::TimeSteps,
         ContactRegime::Auto => RegimeChoice::Automatic,
     };
+    if choice == RegimeChoice::Events && args.contact_step.is_some() {
+        return Err(Failure::new(
+            "--contact-step: contacts are followed from event to event, without time steps",
+            "leave it out, or add `--contacts stepping` or `--contacts auto`",
+        ));
+    }
     if choice == RegimeChoice::TimeSteps {
         let given = [("--method", args.method.is_some()), ("--tolerance", args.tolerance.is_some())];
         let given = given.into_iter().chain([("--step", args.step.is_some()), ("--partial", args.partial)]);
@@ -362,12 +371,12 @@ fn regimes(args: &MotionArgs) -> Outcome<RegimeRules> {
                 "leave it out; --contact-step is the length of the steps",
             ));
         }
-        if args.time / args.contact_step > MOST_STEPS {
-            let steps = args.time / args.contact_step;
+        let steps = args.time / step;
+        if steps > MOST_STEPS {
             return Err(Failure::new(format!("{steps:.0} steps are too many"), "raise --contact-step or lower --time"));
         }
     }
-    Ok(RegimeRules::new(choice, args.contact_step))
+    Ok(RegimeRules::new(choice, step))
 }
 
 /// The title of the plot, which is also the first line of the report.

@@ -2,28 +2,28 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 
 use super::values::finite;
 
 /// What moves the joints.
 #[derive(Args, Default)]
-#[command(next_help_heading = "Control")]
+#[command(next_help_heading = "Control", group(ArgGroup::new("tables").multiple(true)))]
 pub struct ControlArgs {
     /// Joint forces over time, N m or N: a CSV table with a column `t` (s) and columns with names of velocities, as the
     /// table that this command writes has them with `tau.` in front
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", group = "tables")]
     pub efforts: Option<PathBuf>,
     /// Positions over time that --kp and --kd follow, rad or m: a CSV table with a column `t` (s) and columns with names of
     /// joints; columns with `v.` in front are velocities. Joints that are not named stay where they start
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", group = "tables")]
     pub set_points: Option<PathBuf>,
     /// External wrenches over time, N and N m: a CSV table with a column `t` (s) and columns NAME.fx, .fy, .fz, .mx, .my, .mz
     /// for wrenches of the model or of --wrench
-    #[arg(long = "wrenches", value_name = "FILE")]
+    #[arg(long = "wrenches", value_name = "FILE", group = "tables")]
     pub wrench_table: Option<PathBuf>,
     /// What tables are between their rows
-    #[arg(long, value_enum, value_name = "HOW", default_value_t = Interpolation::Hold)]
+    #[arg(long, value_enum, value_name = "HOW", default_value_t = Interpolation::Hold, requires = "tables")]
     pub interpolation: Interpolation,
     /// Joint forces for each radian or metre from the set-point, N m/rad or N/m: one number for all joints, or
     /// JOINT=NUMBER, separated by commas. Without --set-points, joints are held where they start

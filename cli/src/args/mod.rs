@@ -417,7 +417,7 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "picture")]
     pub trace: Vec<String>,
     /// Number of instants that are drawn
-    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500))]
+    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500), requires = "picture")]
     pub strobes: u16,
     /// Let the picture move: the motion in a loop, slowed down or sped up as the caption says, without a script. Readers who
     /// prefer reduced motion see the still picture
@@ -484,9 +484,9 @@ pub struct MotionArgs {
     /// How contacts are followed
     #[arg(long, value_enum, value_name = "HOW", default_value = "events")]
     pub contacts: ContactRegime,
-    /// Time step of `--contacts stepping` and `auto`, s
-    #[arg(long, value_name = "S", value_parser = positive, default_value_t = 1e-3)]
-    pub contact_step: f64,
+    /// Time step of `--contacts stepping` and `auto`, s [default: 0.001]
+    #[arg(long, value_name = "S", value_parser = positive)]
+    pub contact_step: Option<f64>,
     /// How contacts act that collide at the same instant, in motions by events
     #[arg(long, value_enum, value_name = "HOW", default_value = "together")]
     pub impacts: Impacts,

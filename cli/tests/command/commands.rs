@@ -416,6 +416,9 @@ fn failed_simulations_write_nothing() {
         &["--step", "0.1", "--tolerance", "1e-6"],
         &["--rows", "0"],
         &["--rows", "5", "--every", "1"],
+        // Without a picture, and without a table.
+        &["--strobes", "3"],
+        &["--interpolation", "linear"],
     ] {
         assert_eq!(simulate(wrong).status.code(), Some(2), "{wrong:?}");
     }

@@ -97,6 +97,11 @@ fn contacts_are_followed_by_time_steps() {
     let text = "--contacts stepping has a method of its own, for which --method, --tolerance means nothing";
     bad(run_in(&folder, &both), &[text, "--contact-step"]);
     let pendulum = format!("{ROOT}/models/double_pendulum.toml");
+    let alone = ["simulate", &ball, "--contact-step", "1e-4"];
+    bad(
+        run_in(&folder, &alone),
+        &["--contact-step: contacts are followed from event to event", "`--contacts stepping`"],
+    );
     let without = ["simulate", &pendulum, "--contacts", "auto"];
     bad(run_in(&folder, &without), &["--contacts: `double_pendulum` has no contacts"]);
 }
