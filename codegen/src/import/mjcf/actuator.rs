@@ -114,13 +114,14 @@ fn passive(reader: &mut Reader, element: &Element, gear: f64, rules: Rules, driv
     }
 }
 
-/// The joints of the raw model that have what an actuator has under a key, and their velocity ratio to its transmission
-/// without `gear`; or else where, why and what to do.
-fn target(
-    element: &Element,
-    driven: &Driven,
-    key: &str,
-) -> Result<(Range<usize>, f64), (Option<Span>, String, &'static str)> {
+/// Joints of the raw model, and their velocity ratio to a transmission without `gear`.
+type Target = (Range<usize>, f64);
+
+/// Where an actuator cannot be read, if not at the key itself, why, and what to do.
+type Refused = (Option<Span>, String, &'static str);
+
+/// The joints that have what an actuator has under a key.
+fn target(element: &Element, driven: &Driven, key: &str) -> Result<Target, Refused> {
     let unknown = |name: Spanned<&str>, what: &str, help| {
         Err((Some(name.span), format!("{} is not a {what}", quote(name.value)), help))
     };
