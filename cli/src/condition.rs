@@ -1,6 +1,7 @@
 //! Digits that a state leaves to its results: the condition of the mass matrix, and coordinates too large for angles.
 
 use multibody::codegen::plan::Plan;
+use multibody::codegen::singular::{condition, SINGULAR};
 
 /// Velocities of the largest mass matrix whose condition is computed: the time grows with the cube of their number.
 pub const LARGEST: usize = 1000;
@@ -17,47 +18,6 @@ pub struct Doubt {
     /// Whether the matrix is singular but for rounding: also where entries err by one rounding and not by `n`. The bound with
     /// `n` doubts a sound chain of 900 links.
     pub singular: bool,
-}
-
-/// Condition of the mass matrix `M` (`n × n`, row by row) in the norm of row sums, after scaling rows and columns so
-/// that the diagonal is one: units and sizes of the coordinates do not matter then, and no scaling of rows and columns
-/// has a condition more than `n` times smaller (van der Sluis, Numer. Math. 14, 1969). Infinite where rounding has left
-/// the matrix indefinite. The index is that of the velocity with the least pivot.
-fn condition(m: &[f64], n: usize) -> (f64, usize) {
-    let root: Vec<f64> = (0..n).map(|i| m[i * n + i].sqrt()).collect();
-    let mut l: Vec<f64> = (0..n * n).map(|at| m[at] / (root[at / n] * root[at % n])).collect();
-    let largest_sum = |a: &[f64]| a.chunks(n).map(|row| row.iter().map(|x| x.abs()).sum()).fold(0.0_f64, f64::max);
-    let norm = largest_sum(&l);
-    // Cholesky's factor in place of the lower triangle.
-    let mut least = (f64::INFINITY, 0);
-    for j in 0..n {
-        for i in j..n {
-            let sum: f64 = (0..j).map(|k| l[i * n + k] * l[j * n + k]).sum();
-            l[i * n + j] -= sum;
-        }
-        let pivot = l[j * n + j];
-        if pivot.is_nan() || pivot < least.0 {
-            least = (pivot, j);
-        }
-        if pivot.is_nan() || pivot <= 0.0 {
-            return (f64::INFINITY, j);
-        }
-        (j..n).for_each(|i| l[i * n + j] /= pivot.sqrt());
-    }
-    // The inverse, column by column.
-    let mut inverse = vec![0.0; n * n];
-    for (k, x) in inverse.chunks_mut(n).enumerate() {
-        x[k] = 1.0;
-        for i in 0..n {
-            let sum: f64 = (0..i).map(|j| l[i * n + j] * x[j]).sum();
-            x[i] = (x[i] - sum) / l[i * n + i];
-        }
-        for i in (0..n).rev() {
-            let sum: f64 = (i + 1..n).map(|j| l[j * n + i] * x[j]).sum();
-            x[i] = (x[i] - sum) / l[i * n + i];
-        }
-    }
-    (norm * largest_sum(&inverse), least.1)
 }
 
 /// What the mass matrix, which `matrix` writes row by row, leaves of the digits of velocities and accelerations, where that is
@@ -83,7 +43,7 @@ pub fn of_mass_matrix(plan: &Plan, matrix: impl FnOnce(&mut [f64])) -> Option<Do
          and accelerations; the others nearly determine `{name}`"
     );
     let help = format!("compare the masses and inertias that `{name}` moves with the others, or give it an armature");
-    Some(Doubt { what, help, singular: f64::EPSILON * condition > NO_DIGIT })
+    Some(Doubt { what, help, singular: condition > SINGULAR })
 }
 
 /// The coordinate whose neighbours among the doubles are farthest away: its name, and that distance, rad or m.

@@ -31,8 +31,6 @@ type System = WithContacts<Mechanism>;
 
 /// Number of events that are printed.
 const SHOWN: usize = 12;
-/// Distance beyond a stop, rad or m, from which on a joint is named: with less, a motion by events begins.
-const BEYOND: f64 = 1e-9;
 
 /// A motion with contacts.
 pub struct Touched {
@@ -235,7 +233,7 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
     let (q, p) = (observer.q.clone(), observer.p.clone());
     let (close, rules, start) = (projection(settings, &system), settings.regimes, (&q, &p));
     let motion = ContactMotion::new(&mut system, (method, settings.step), close, rules, 0.0, start);
-    let mut motion = motion.map_err(|e| beyond_stops(plan, &q, &e).unwrap_or_else(|| failed(e)))?;
+    let mut motion = motion.map_err(|e| beyond_stops(plan, (&q, rules.choice), &e).unwrap_or_else(|| failed(e)))?;
     motion.events.rules.order = settings.impacts;
     let mut progress = Progress::new(settings.time);
     let mut presses = Presses { pressed: vec![false; system.modes().len()], changes: Vec::new() };
@@ -256,10 +254,15 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
         }
     }
     progress.clear();
-    observer.record.interrupted = match observer.cut {
-        true => observer.record.t.last().copied(),
-        false => (motion.time() < settings.time).then_some(motion.time()),
-    };
+    let end = motion.time();
+    if observer.cut && observer.record.t.last() != Some(&end) {
+        // Events and forces are known to here; of the rows in between, there are none.
+        let (mut q, mut p) = (observer.q.clone(), observer.p.clone());
+        motion.state(&system, &mut q, &mut p);
+        (observer.q, observer.p) = (q, p);
+        observer.row(&mut system, end);
+    }
+    observer.record.interrupted = (observer.cut || end < settings.time).then_some(end);
     let statistics: Statistics = motion.integration_statistics();
     let (modes, count) = (system.modes().iter().copied().enumerate(), system.modes().len());
     Ok(Touched {
@@ -308,8 +311,10 @@ fn failure(plan: &Plan, error: &HybridError) -> Failure {
 }
 
 /// The failure of a start where a joint stands beyond its stop, with all joints that do.
-fn beyond_stops(plan: &Plan, q: &[f64], error: &HybridError) -> Option<Failure> {
+fn beyond_stops(plan: &Plan, (q, choice): (&[f64], RegimeChoice), error: &HybridError) -> Option<Failure> {
     let HybridError::Overlap { contact: first, .. } = error else { return None };
+    // With less, motions begin, by time steps with far more.
+    let most = if choice == RegimeChoice::Events { 1e-9 } else { 1e-3 };
     let contacts = &plan.model.contacts;
     contacts.get(*first)?.stop()?;
     let beyond = contacts.iter().enumerate().filter_map(|(k, contact)| {
@@ -321,7 +326,7 @@ fn beyond_stops(plan: &Plan, q: &[f64], error: &HybridError) -> Option<Failure> 
         let amount = if by < 1e-3 { format!("{by:.1e}") } else { format!("{by:.3}") };
         let (name, end) = (quote(&plan.model.joints[joint].name), if from_below { "lower" } else { "upper" });
         let text = format!("joint {name} stands {amount} {} beyond its {end} limit", unit(plan, k));
-        (k == *first || by > BEYOND).then_some(text)
+        (k == *first || by > most).then_some(text)
     });
     Some(Failure::new(
         format!("at the start, {}", beyond.collect::<Vec<_>>().join(", ")),

@@ -96,6 +96,9 @@ const SHOWN: usize = 4;
 const KNOWN: u64 = 20_000;
 /// Steps of a whole run from which on they are said to be many.
 const MANY: f64 = 1e7;
+/// Way of a joint in a step, rad or m, below which the step is not as short as that for the sake of the motion: accurate methods
+/// take a tenth of a radian in one.
+const HARDLY: f64 = 1e-3;
 
 /// Record of a simulation.
 #[derive(Default)]
@@ -441,7 +444,9 @@ fn go(
         observer.record.spent.output += clock.elapsed().as_secs_f64();
         steps += 1;
         if observer.record.crawls.is_none() {
-            observer.record.crawls = crawls(settings, steps, end);
+            let fastest =
+                observer.record.v.last().map_or(0.0, |v| v.iter().fold(0.0, |most: f64, v| most.max(v.abs())));
+            observer.record.crawls = crawls(settings, (steps, end), fastest);
             if let Some([what, help]) = &observer.record.crawls {
                 progress.clear();
                 note(format_args!("hint: {what}\n  help: {help}"));
@@ -453,13 +458,14 @@ fn go(
     Ok(())
 }
 
-/// What is told of a run by an explicit method that chooses steps so small that it would need very many of them, and what to do.
-fn crawls(settings: &Settings, steps: u64, t: f64) -> Option<[String; 2]> {
+/// What is told of a run by an explicit method that chooses steps so small that it would need very many of them, in which
+/// hardly anything moves, and what to do. `fastest`: the largest velocity of a joint, rad/s or m/s.
+fn crawls(settings: &Settings, (steps, t): (u64, f64), fastest: f64) -> Option<[String; 2]> {
     if steps < KNOWN || !settings.is_adaptive() || !settings.is_explicit() {
         return None;
     }
     let all = steps as f64 * (settings.time / t);
-    if all <= MANY {
+    if all <= MANY || t / steps as f64 * fastest > HARDLY {
         return None;
     }
     let what = format!(

@@ -27,7 +27,7 @@ const REASONS: [&str; 5] = [
     "because no freedom is between their bodies",
     "because such shapes cannot touch (a sphere or a capsule can touch a sphere, capsule, box, cylinder or hull)",
     "because each would be more than 32 contacts",
-    "because they overlap where the mechanism starts",
+    "because they overlap at the described start, or at that within the ranges of the joints",
 ];
 const JOINED: usize = 0;
 const RIGID: usize = 1;

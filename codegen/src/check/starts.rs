@@ -31,7 +31,8 @@ pub(super) fn starts(raw: &RawModel, numbers: &mut Numbers) -> Vec<Start> {
             None => vec![0.0; kind.nv()],
         };
         if joint.start.is_some() || joint.start_velocity.is_some() || held {
-            starts.push(Start { joint: index, q, v, held });
+            let stated = joint.start.is_some() || held;
+            starts.push(Start { joint: index, q, v, held, stated });
         }
     }
     starts

@@ -40,7 +40,8 @@ pub struct ImportOptions {
     /// A floor that the shapes of the robot can touch; for URDF and MJCF only. Without one, they touch nothing.
     pub floor: Option<Floor>,
     /// Contacts between the bodies of the robot, with this coefficient of friction; for URDF and MJCF only. Bodies that a
-    /// joint connects make none, and neither do shapes that overlap where the mechanism starts.
+    /// joint connects make none, and neither do shapes that overlap at the described start or at that
+    /// within the ranges of the joints.
     pub self_contact: Option<f64>,
 }
 

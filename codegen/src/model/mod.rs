@@ -235,6 +235,8 @@ pub struct Start {
     pub v: Vec<f64>,
     /// Whether they do not change when loops are closed.
     pub held: bool,
+    /// Whether the description states the coordinates: by themselves, or by holding the joint where it is neutral.
+    pub stated: bool,
 }
 
 /// A checked tree: `joints` is depth first, every body is the child of exactly one joint, parents come first, mimic

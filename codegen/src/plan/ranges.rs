@@ -7,15 +7,13 @@ use crate::model::{ConstraintKind, Contact, JointMotion, Model};
 
 impl Plan {
     /// Moves coordinates that are outside of the range of their joint, or beyond its stops, to the middle of it; to its end where
-    /// it has only one. Nothing moves where the model states a `start`, and joints that are part of a loop stay where they are,
-    /// because loops are often described as closed there.
+    /// it has only one. Joints stay whose position the model states, and those that are part of a loop or a coupling, because
+    /// these are often described as closed where they are.
     ///
     /// [`Plan::start`] does not do so: it is what the description says.
     pub fn move_into_ranges(&self, q: &mut [f64]) {
-        if !self.model.starts.is_empty() {
-            return;
-        }
-        let (ranges, stay) = (ranges(&self.model), in_loops(&self.model));
+        let (ranges, mut stay) = (ranges(&self.model), closed(&self.model));
+        self.model.starts.iter().filter(|start| start.stated).for_each(|start| stay[start.joint] = true);
         for slot in &self.slots {
             let Some(Source::State { q: at, .. }) = slot.at else { continue };
             let ([lower, upper], Some(q)) = (ranges[slot.joint], q.get_mut(at)) else { continue };
@@ -45,15 +43,21 @@ fn ranges(model: &Model) -> Vec<[f64; 2]> {
     ranges
 }
 
-/// Which joints are part of a loop, themselves or by joints that follow them.
-fn in_loops(model: &Model) -> Vec<bool> {
+/// Which joints are part of a loop or a coupling, themselves or by joints that follow them.
+fn closed(model: &Model) -> Vec<bool> {
     let mut above = vec![None; model.bodies.len()];
     for (k, joint) in model.joints.iter().enumerate() {
         above[joint.child] = Some(k);
     }
     let mut found = vec![false; model.joints.len()];
     for constraint in &model.constraints {
-        let ConstraintKind::Loop { first, second, .. } = &constraint.kind else { continue };
+        let (first, second) = match &constraint.kind {
+            ConstraintKind::Loop { first, second, .. } => (first, second),
+            ConstraintKind::Coupling { terms, .. } => {
+                terms.iter().for_each(|(joint, _)| found[*joint] = true);
+                continue;
+            }
+        };
         // Joints above both bodies do not belong to the loop.
         let mut passed = vec![false; model.joints.len()];
         for mount in [first, second] {
@@ -80,10 +84,12 @@ mod tests {
     use super::*;
     use crate::read::{self, ImportOptions};
 
-    /// Coordinates of a four-bar linkage at zero beside a slide and a door, in which they move, by name.
-    fn moved(four_bar: &str) -> Vec<(String, f64)> {
+    /// What moves of the coordinates of a four-bar linkage at zero, beside a slide, a door and two coupled wheels, by name.
+    /// `of_door`: what the hinge of the door has beside its limits.
+    fn moved(four_bar: &str, of_door: &str) -> Vec<(String, f64)> {
         let text = four_bar.replace("name = \"crank_pin\"", "name = \"crank_pin\"\nrange = [1, 2]")
-            + "
+            + &format!(
+                "
 [[body]]
 name = \"slide\"
 mass = 1
@@ -105,8 +111,38 @@ name = \"hinge\"
 type = \"revolute\"
 child = \"door\"
 axis = [0, 0, 1]
-limits = { upper = -1 }
-";
+limits = {{ upper = -1 }}
+{of_door}
+
+[[body]]
+name = \"first\"
+mass = 1
+inertia = [1, 1, 1]
+
+[[joint]]
+name = \"first_axle\"
+type = \"revolute\"
+child = \"first\"
+axis = [0, 0, 1]
+limits = [1, 2]
+
+[[body]]
+name = \"second\"
+mass = 1
+inertia = [1, 1, 1]
+
+[[joint]]
+name = \"second_axle\"
+type = \"revolute\"
+child = \"second\"
+axis = [0, 0, 1]
+
+[[coupling]]
+name = \"belt\"
+joints = [\"first_axle\", \"second_axle\"]
+ratios = [1, -1]
+"
+            );
         let model = read::model("fourbar.toml", &text, &ImportOptions::default()).expect("a model").model;
         let plan = Plan::new(&model, 1e-9);
         let mut q = vec![0.0; plan.dims.nq];
@@ -115,13 +151,17 @@ limits = { upper = -1 }
         moved.collect()
     }
 
-    /// The middle of a range, the one end of limits; but no joint of a loop, and nothing where a start is stated.
+    /// The middle of a range, the one end of limits; but no joint of a loop or a coupling, and none whose position is stated, also
+    /// where others state theirs, or velocities.
     #[test]
     fn positions_move_into_ranges() {
         let stated = include_str!("../../../models/mechanisms/fourbar.toml");
-        assert!(moved(stated).is_empty(), "{:?}", moved(stated));
+        let both = [("track".to_string(), 1.5), ("hinge".to_string(), -1.0)];
+        assert_eq!(moved(stated, ""), both);
         let open = stated.lines().filter(|line| !line.starts_with("start") && !line.starts_with("held"));
         let open: String = open.map(|line| format!("{line}\n")).collect();
-        assert_eq!(moved(&open), [("track".to_string(), 1.5), ("hinge".to_string(), -1.0)]);
+        assert_eq!(moved(&open, ""), both);
+        assert_eq!(moved(&open, "start_velocity = 1"), both);
+        assert_eq!(moved(&open, "start = 0"), both[..1]);
     }
 }

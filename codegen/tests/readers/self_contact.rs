@@ -93,7 +93,7 @@ fn links_of_a_robot_touch_where_that_is_asked_for() {
     for told in [
         format!("6 pairs of shapes left {WITHOUT} one joint connects their bodies: `trunk/left`, `trunk/right`, `left/left_box`"),
         format!("1 pair of shapes left {WITHOUT} such shapes cannot touch (a sphere or"),
-        format!("1 pair of shapes left {WITHOUT} they overlap where the mechanism starts: `trunk/skull`"),
+        format!("1 pair of shapes left {WITHOUT} they overlap at the described start, or at that within the ranges of the joints: `trunk/skull`"),
     ] {
         assert!(findings.contains(&told), "{told}\n{findings}");
     }
@@ -125,7 +125,10 @@ fn a_rod_through_a_plate_overlaps() {
     };
     let (model, findings) = read("r.urdf", &text("0.1 0.1 0"), asked());
     assert!(model.contacts.is_empty());
-    assert!(findings.contains("overlap where the mechanism starts: `plate/rod`"), "{findings}");
+    assert!(
+        findings.contains("overlap at the described start, or at that within the ranges of the joints: `plate/rod`"),
+        "{findings}"
+    );
     assert!(findings.contains("warning: no contacts between bodies were found"), "{findings}");
     let (model, findings) = read("r.urdf", &text("0.52 0.1 0"), asked());
     assert_eq!(pairs(&model), [("plate/rod".to_string(), 14, 0.3)], "{findings}");

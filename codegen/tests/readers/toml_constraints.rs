@@ -127,7 +127,7 @@ fn starts_come_in_the_order_of_joints() {
     let degrees = f64::to_radians;
     let start = |joint: usize, q: &[f64], held| {
         let v = vec![0.0; m.joints[joint].kind.nv()];
-        Start { joint, q: q.to_vec(), v, held }
+        Start { joint, q: q.to_vec(), v, held, stated: true }
     };
     assert_eq!(
         m.starts,
@@ -160,9 +160,9 @@ fn quaternions_are_scaled() {
 fn starts_need_no_loops() {
     let text =
         "[[body]]\nname = 'a'\nmass = 1\ncom = [1, 0, 0]\n[[joint]]\nname = 'j'\ntype = 'pin'\nchild = 'a'\nstart = 1";
-    assert_eq!(clean(text).starts, [Start { joint: 0, q: vec![1.0], v: vec![0.0], held: false }]);
+    assert_eq!(clean(text).starts, [Start { joint: 0, q: vec![1.0], v: vec![0.0], held: false, stated: true }]);
     let moving = clean(&text.replace("start = 1", "start_velocity = -2.5")).starts;
-    assert_eq!(moving, [Start { joint: 0, q: vec![0.0], v: vec![-2.5], held: false }]);
+    assert_eq!(moving, [Start { joint: 0, q: vec![0.0], v: vec![-2.5], held: false, stated: false }]);
     assert_eq!(clean(&text.replace("start = 1", "held = false")).starts, []);
     assert_eq!(clean(text).constraints, []);
 }

@@ -132,7 +132,8 @@ where
     fn statistics(&self) -> Statistics;
 
     /// One step of `h` s from time `t` (s). A call does not depend on earlier ones, except
-    /// for multistep methods, whose history starts again when `q` and `p` are not those of the last step.
+    /// for multistep methods, whose history starts again when `q` and `p` are not those of the last step, and for methods that
+    /// solve their equations from what the last step found, in the same way.
     ///
     /// # Errors
     /// [`StepError`]; `q` and `p` are then as they were.

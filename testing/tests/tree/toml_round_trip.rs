@@ -113,7 +113,7 @@ fn start(model: &Model, joint: usize, rng: &mut Rng) -> Option<Start> {
         q[first..].copy_from_slice(&rng.pick(&[[0.0, 0.0, 0.0, 1.0], [0.6, 0.0, 0.0, -0.8], [0.5; 4]]));
     }
     let v = (0..j.kind.nv()).map(|_| rng.pick(&[0.0, 0.7, -2.0])).collect();
-    Some(Start { joint, q, v, held: rng.chance(0.3) })
+    Some(Start { joint, q, v, held: rng.chance(0.3), stated: true })
 }
 
 #[test]
