@@ -134,6 +134,30 @@ fn a_rod_through_a_plate_overlaps() {
     assert_eq!(pairs(&model), [("plate/rod".to_string(), 14, 0.3)], "{findings}");
 }
 
+/// A joint with a range from 1 to 3 rad starts at 2, where the ball that it carries is in that of the base.
+#[test]
+fn what_overlaps_within_the_ranges_is_left_out() {
+    let ball = "sphere radius='0.1'";
+    let parts = [
+        link("a", &[("low", "-0.416 0 -0.909", ball)]),
+        link("b", &[]),
+        link("c", &[("high", "1 0 0", ball)]),
+        joint("b", "a", "revolute", "0 0 0"),
+        joint("c", "b", "revolute", "0 0 0"),
+    ];
+    let text = format!("<robot name='r'>{}</robot>", parts.concat());
+    let (model, findings) = read("r.urdf", &text, asked());
+    assert_eq!(named(&model), ["low/high"], "{findings}");
+    let limited = text.replacen(
+        "<axis xyz='0 1 0'/>",
+        "<axis xyz='0 1 0'/><limit lower='1' upper='3' effort='1' velocity='1'/>",
+        1,
+    );
+    let (model, findings) = read("r.urdf", &limited, asked());
+    assert!(model.contacts.is_empty(), "{findings}");
+    assert!(findings.contains("within the ranges of the joints: `low/high`"), "{findings}");
+}
+
 /// Names of different shapes may come to the same; the second pair has a number.
 #[test]
 fn pairs_have_names_of_their_own() {
