@@ -3,9 +3,12 @@
 
 use std::fmt::Write;
 
+use mbd_codegen::code::{compile, Code};
+use mbd_codegen::generate::generate_from;
 use mbd_codegen::model::Model;
+use mbd_codegen::plan::Plan;
 use mbd_codegen::read::{self, Base, ImportOptions};
-use mbd_codegen::{generate, Options, Output};
+use mbd_codegen::{search, Options, Output};
 
 /// Names, files and bases; chains without a file are made here.
 const MODELS: [(&str, &str, Base); 13] = [
@@ -67,9 +70,24 @@ fn model(list: &mut String, name: &str, path: &str, text: &str, base: Base) {
         runtime: "::mbd_runtime".to_string(),
         source: name.to_string(),
         ..Options::default()
+    }
+    .of_model(false);
+    let plan = search::plan(&model, options.searches());
+    write(&format!("{name}.rs"), &generate_from(&plan, &options).expect("code").source);
+    let [one, chain, lane] = bounds(&plan, Output::Rates, &options);
+    let [.., lane_q] = bounds(&plan, Output::Accelerations, &options);
+    let _ = writeln!(list, "    {name} [{one:.2} {chain:.2} {lane:.2} {lane_q:.2}];");
+}
+
+/// Cycles that the processor of the cost model needs at least, as `mbd count` prints them: for one of many states, for one that
+/// waits for the one before it, and for each of eight at once. No code for these operations takes less, but for loops over like
+/// branches, which compute four in one instruction.
+fn bounds(plan: &Plan, output: Output, options: &Options) -> [f64; 3] {
+    let (path, [one, lane]) = match compile(plan, output, options).expect("a program").program {
+        Code::Straight(program) => (program.critical_path(), [program.bound(), program.bound_of_lanes()]),
+        Code::Rolled(program) => (program.cost().critical_path, program.bounds()),
     };
-    write(&format!("{name}.rs"), &generate(&model, &options).expect("code").source);
-    let _ = writeln!(list, "    {name};");
+    [one, one.max(f64::from(path)), lane]
 }
 
 /// A chain of revolute joints: of equal bars in the plane, or of bodies in space that have nothing in common.

@@ -4,7 +4,11 @@
 //!     LANES=ur5,planar100 LANES_MORE=talos_reduced.urdf cargo run --release --manifest-path benches/lanes/Cargo.toml
 //!
 //! All variants of a mechanism run in turns on the same random states. The lower quartile of many rounds counts, in
-//! cycles of a chain of products (4 cycles each) that is timed in the same rounds, for each state.
+//! cycles of a chain of integer operations (a cycle each) that is timed in the same rounds, for each state. In brackets: that time
+//! divided by the cycles of the busiest pipe, for one state with two pipes that multiply and two that add, for lanes and
+//! batches with two pipes of 64 bytes. Processors that compute vectors of 64 bytes in two halves, or have none, need up to
+//! twice the latter. `chain`: each state waits for the rates of the one before it; in brackets, by the critical path if that
+//! is longer. Loops over like branches may take less for one state.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -29,16 +33,16 @@ unsafe fn narrow<K: Kernel<ID, L, X>, const ID: usize, X>(arguments: X) {
     K::run::<Fused>(arguments);
 }
 
-/// Nanoseconds of a chain of products, for one of them.
-fn product() -> f64 {
+/// Nanoseconds of a cycle: rotations and exclusive ors that wait for one another take one each on all processors of today.
+fn cycle() -> f64 {
     const N: usize = 2000;
-    let (mut x, factor) = (black_box(1.0), black_box(1.0 + 1e-12));
+    let (mut x, other) = (black_box(0x9e37_79b9_7f4a_7c15_u64), black_box(0x2545_f491_4f6c_dd1d));
     let from = Instant::now();
     for _ in 0..N {
-        x *= factor;
+        x = x.rotate_left(7) ^ other;
     }
     black_box(x);
-    from.elapsed().as_secs_f64() * 1e9 / N as f64
+    from.elapsed().as_secs_f64() * 1e9 / (2 * N) as f64
 }
 
 fn quartile(times: &mut [f64]) -> f64 {
@@ -47,22 +51,23 @@ fn quartile(times: &mut [f64]) -> f64 {
 }
 
 /// Lower quartiles of the times of some functions that run in turns, divided by the number of states and by the length
-/// of a cycle.
-fn race(rounds: usize, states: usize, variants: &mut [(&str, &mut dyn FnMut())]) {
+/// of a cycle; each function comes with the cycles that it cannot do without.
+fn race(rounds: usize, states: usize, variants: &mut [(&str, f64, &mut dyn FnMut())]) {
     let mut times = vec![Vec::new(); variants.len()];
     let mut clock = Vec::new();
     for round in 0..rounds {
-        clock.push(product() / 4.0);
+        clock.push(cycle());
         for k in 0..variants.len() {
             let k = (k + round) % variants.len();
             let from = Instant::now();
-            (variants[k].1)();
+            (variants[k].2)();
             times[k].push(from.elapsed().as_secs_f64() * 1e9 / states as f64);
         }
     }
     let cycle = quartile(&mut clock);
-    for (k, (name, _)) in variants.iter().enumerate() {
-        print!("  {name} {:8.1}", quartile(&mut times[k]) / cycle);
+    for (k, (name, bound, _)) in variants.iter().enumerate() {
+        let cycles = quartile(&mut times[k]) / cycle;
+        print!("  {name} {cycles:8.1} ({:4.2})", cycles / bound);
     }
     println!("  ({cycle:.3} ns)");
 }
@@ -108,7 +113,7 @@ fn blocks<const N: usize>(columns: &[Vec<Line>; N]) -> Vec<Block<N>> {
 }
 
 macro_rules! models {
-    ($($name:ident;)*) => {
+    ($($name:ident [$one:literal $chain:literal $lane:literal $lane_q:literal];)*) => {
         $(
             mod $name {
                 include!(concat!(env!("OUT_DIR"), "/", stringify!($name), ".rs"));
@@ -125,6 +130,7 @@ macro_rules! models {
                     let (q1, p1) = (states(&qs), states(&ps));
                     let (q8, p8) = (blocks(&qs), blocks(&ps));
                     let lanes = robot.lanes::<L>();
+                    let mut moved = ([0.0; NQ], [0.0; NV]);
                     let (mut qd1, mut pd1) = (q1.clone(), p1.clone());
                     let (mut qd8, mut pd8, mut a8) = (q8.clone(), p8.clone(), p8.clone());
                     let (mut qd9, mut pd9) = (q8.clone(), p8.clone());
@@ -132,23 +138,30 @@ macro_rules! models {
                     let has = std::is_x86_feature_detected!("avx2") && std::is_x86_feature_detected!("fma");
                     print!("{:<16}", stringify!($name));
                     race(rounds, STATES, &mut [
-                        ("one", &mut || for k in 0..STATES {
+                        ("one", $one, &mut || for k in 0..STATES {
                             robot.rates(black_box(&q1[k]), black_box(&p1[k]), &mut qd1[k], &mut pd1[k]);
                         }),
-                        ("lanes", &mut || for k in 0..STATES / L {
+                        ("chain", $chain, &mut || for k in 0..STATES {
+                            // Each state is moved a little by the rates of the one before it.
+                            let (mut q, mut p) = (q1[k], p1[k]);
+                            q.iter_mut().zip(&moved.0).for_each(|(q, qd)| *q += 1e-9 * qd);
+                            p.iter_mut().zip(&moved.1).for_each(|(p, pd)| *p += 1e-9 * pd);
+                            robot.rates(&q, &p, &mut moved.0, &mut moved.1);
+                        }),
+                        ("lanes", $lane, &mut || for k in 0..STATES / L {
                             lanes.rates(black_box(&q8[k].0), black_box(&p8[k].0), &mut qd8[k].0, &mut pd8[k].0);
                         }),
-                        ("AVX2", &mut || for k in 0..STATES / L {
+                        ("AVX2", $lane, &mut || for k in 0..STATES / L {
                             if has {
                                 // SAFETY: the processor has both.
                                 unsafe { narrow::<Robot, 0, _>((black_box(&q8[k].0), black_box(&p8[k].0), &lanes.tau, &mut qd9[k].0, &mut pd9[k].0)) };
                             }
                         }),
-                        ("batch", &mut || {
+                        ("batch", $lane, &mut || {
                             let (q, p, tau) = (parts(black_box(&qs)), parts(&ps), parts(&taus));
                             robot.rates_batch(q, p, tau, parts_mut(&mut qds), parts_mut(&mut pds)).expect("columns of one length");
                         }),
-                        ("lanes q''", &mut || for k in 0..STATES / L {
+                        ("lanes q''", $lane_q, &mut || for k in 0..STATES / L {
                             lanes.accelerations(black_box(&q8[k].0), black_box(&p8[k].0), &mut a8[k].0);
                         }),
                     ]);
