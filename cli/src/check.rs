@@ -70,7 +70,8 @@ fn summary(path: &Path, name: &str, model: &Model, out: &mut dyn Write) -> Outco
     source::tell_notices(path, &plan.notices);
     if let Some(name) = dependent_velocity(&plan) {
         let what = format!(
-            "the mass matrix is singular in every state, as far as doubles tell: no inertia resists `{name}` while the velocities before it may follow"
+            "the mass matrix is singular in every state, as far as doubles tell: no inertia resists `{name}` while the \
+             velocities before it may follow"
         );
         let help =
             format!("give what `{name}` moves mass and inertia, give its joint an `armature`, or make it `fixed`");

@@ -444,9 +444,7 @@ fn go(
         observer.record.spent.output += clock.elapsed().as_secs_f64();
         steps += 1;
         if observer.record.crawls.is_none() {
-            let fastest =
-                observer.record.v.last().map_or(0.0, |v| v.iter().fold(0.0, |most: f64, v| most.max(v.abs())));
-            observer.record.crawls = crawls(settings, (steps, end), fastest);
+            observer.record.crawls = crawls(settings, (steps, end), observer.record.v.last());
             if let Some([what, help]) = &observer.record.crawls {
                 progress.clear();
                 note(format_args!("hint: {what}\n  help: {help}"));
@@ -459,12 +457,13 @@ fn go(
 }
 
 /// What is told of a run by an explicit method that chooses steps so small that it would need very many of them, in which
-/// hardly anything moves, and what to do. `fastest`: the largest velocity of a joint, rad/s or m/s.
-fn crawls(settings: &Settings, (steps, t): (u64, f64), fastest: f64) -> Option<[String; 2]> {
+/// hardly anything moves, and what to do. `v`: the velocities of the last row, rad/s or m/s.
+fn crawls(settings: &Settings, (steps, t): (u64, f64), v: Option<&Vec<f64>>) -> Option<[String; 2]> {
     if steps < KNOWN || !settings.is_adaptive() || !settings.is_explicit() {
         return None;
     }
     let all = steps as f64 * (settings.time / t);
+    let fastest = v.into_iter().flatten().fold(0.0, |most: f64, v| most.max(v.abs()));
     if all <= MANY || t / steps as f64 * fastest > HARDLY {
         return None;
     }

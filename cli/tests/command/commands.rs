@@ -48,36 +48,26 @@ fn check_tells_of_mass_matrices_that_are_singular_everywhere() {
         std::fs::write(&path, text).unwrap();
         path.to_str().unwrap().to_owned()
     };
-    let body = |name: &str| format!("[[body]]\nname = \"{name}\"\n");
-    let heavy = "mass = 1\ninertia = [1, 1, 1]\n";
-    let joint = |name: &str, kind: &str, parent: &str, child: &str, more: &str| {
+    // A body with what it has, on its parent by a joint of a type with what else that has.
+    let link = |parent: &str, (joint, kind): (&str, &str), (body, has): (&str, &str), more: &str| {
         let parent = if parent.is_empty() { String::new() } else { format!("parent = \"{parent}\"\n") };
         let axis = if kind == "floating" { "" } else { "axis = [0, 0, 1]\n" };
-        format!("[[joint]]\nname = \"{name}\"\ntype = \"{kind}\"\n{parent}child = \"{child}\"\n{axis}{more}")
+        format!(
+            "[[body]]\nname = \"{body}\"\n{has}[[joint]]\nname = \"{joint}\"\ntype = \"{kind}\"\n{parent}child = \"{body}\"\n{axis}{more}"
+        )
+    };
+    let heavy = "mass = 1\ninertia = [1, 1, 1]\n";
+    let on_light = |first: (&str, &str), second: (&str, &str)| {
+        link("", first, ("light", ""), "") + &link("light", second, ("heavy", heavy), "")
     };
     let mimic = [
-        body("base") + heavy,
-        joint("turn", "revolute", "", "base", ""),
-        body("left"),
-        joint("lead", "revolute", "base", "left", ""),
-        body("right"),
-        joint("follow", "revolute", "base", "right", "mimic = { joint = \"lead\" }\n"),
+        link("", ("turn", "revolute"), ("base", heavy), ""),
+        link("base", ("lead", "revolute"), ("left", ""), ""),
+        link("base", ("follow", "revolute"), ("right", ""), "mimic = { joint = \"lead\" }\n"),
     ]
     .concat();
-    let slides = [
-        body("light"),
-        joint("first", "prismatic", "", "light", ""),
-        body("heavy") + heavy,
-        joint("second", "prismatic", "light", "heavy", ""),
-    ]
-    .concat();
-    let base = [
-        body("light"),
-        joint("motion", "floating", "", "light", ""),
-        body("heavy") + heavy,
-        joint("hinge", "revolute", "light", "heavy", ""),
-    ]
-    .concat();
+    let slides = on_light(("first", "prismatic"), ("second", "prismatic"));
+    let base = on_light(("motion", "floating"), ("hinge", "revolute"));
     for (name, text, velocity) in [("mimic", mimic, "lead"), ("slides", slides, "second"), ("base", base, "hinge")] {
         let path = file(&format!("{name}.toml"), &format!("name = \"{name}\"\n{text}"));
         bad(

@@ -84,65 +84,26 @@ mod tests {
     use super::*;
     use crate::read::{self, ImportOptions};
 
+    /// A body on the ground, by a joint of a type and with what else it has.
+    fn grounded(body: &str, joint: &str, kind: &str, more: &str) -> String {
+        format!(
+            "\n[[body]]\nname = \"{body}\"\nmass = 1\ninertia = [1, 1, 1]\n\n[[joint]]\nname = \"{joint}\"\ntype = \"{kind}\"\n\
+             child = \"{body}\"\naxis = [1, 0, 0]\n{more}\n"
+        )
+    }
+
     /// What moves of the coordinates of a four-bar linkage at zero, beside a slide, a door and two coupled wheels, by name.
     /// `of_door`: what the hinge of the door has beside its limits.
     fn moved(four_bar: &str, of_door: &str) -> Vec<(String, f64)> {
-        let text = four_bar.replace("name = \"crank_pin\"", "name = \"crank_pin\"\nrange = [1, 2]")
-            + &format!(
-                "
-[[body]]
-name = \"slide\"
-mass = 1
-
-[[joint]]
-name = \"track\"
-type = \"prismatic\"
-child = \"slide\"
-axis = [1, 0, 0]
-range = [1, 2]
-
-[[body]]
-name = \"door\"
-mass = 1
-inertia = [1, 1, 1]
-
-[[joint]]
-name = \"hinge\"
-type = \"revolute\"
-child = \"door\"
-axis = [0, 0, 1]
-limits = {{ upper = -1 }}
-{of_door}
-
-[[body]]
-name = \"first\"
-mass = 1
-inertia = [1, 1, 1]
-
-[[joint]]
-name = \"first_axle\"
-type = \"revolute\"
-child = \"first\"
-axis = [0, 0, 1]
-limits = [1, 2]
-
-[[body]]
-name = \"second\"
-mass = 1
-inertia = [1, 1, 1]
-
-[[joint]]
-name = \"second_axle\"
-type = \"revolute\"
-child = \"second\"
-axis = [0, 0, 1]
-
-[[coupling]]
-name = \"belt\"
-joints = [\"first_axle\", \"second_axle\"]
-ratios = [1, -1]
-"
-            );
+        let text = [
+            four_bar.replace("name = \"crank_pin\"", "name = \"crank_pin\"\nrange = [1, 2]"),
+            grounded("slide", "track", "prismatic", "range = [1, 2]"),
+            grounded("door", "hinge", "revolute", &format!("limits = {{ upper = -1 }}\n{of_door}")),
+            grounded("first", "first_axle", "revolute", "limits = [1, 2]"),
+            grounded("second", "second_axle", "revolute", ""),
+            "[[coupling]]\nname = \"belt\"\njoints = [\"first_axle\", \"second_axle\"]\nratios = [1, -1]\n".to_string(),
+        ]
+        .concat();
         let model = read::model("fourbar.toml", &text, &ImportOptions::default()).expect("a model").model;
         let plan = Plan::new(&model, 1e-9);
         let mut q = vec![0.0; plan.dims.nq];

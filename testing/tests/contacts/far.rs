@@ -525,6 +525,18 @@ contact = [{ name = "c", between = ["floor", "skin"] }]
     }
 }
 
+/// Lowers the least times, s, by those to make a motion of a system ready and to run it.
+fn timed<Y, M>(least: &mut [f64; 2], system: &mut Y, make: impl Fn(&mut Y) -> M, run: impl Fn(&mut M, &mut Y)) {
+    let start = Instant::now();
+    let mut motion = make(system);
+    let ready = Instant::now();
+    run(&mut motion, system);
+    let end = Instant::now();
+    for (least, time) in least.iter_mut().zip([ready - start, end - ready]) {
+        *least = least.min(time.as_secs_f64());
+    }
+}
+
 /// Least times of a motion in machine code, s, in turns: without contacts, with contacts that are not minded, with contacts. First
 /// the time to make the motion ready, then that of its steps.
 fn times((plan, q, v): &(Plan, Vec<f64>, Vec<f64>), time: f64, rounds: u32) -> [[f64; 2]; 3] {
@@ -535,32 +547,24 @@ fn times((plan, q, v): &(Plan, Vec<f64>, Vec<f64>), time: f64, rounds: u32) -> [
     free.conjugate_momenta(q, v, &mut p);
     let mut system = WithContacts::new(plan.compiled_with_contacts::<f64>(&Options::default(), 10).unwrap());
     let mut least = [[f64::INFINITY; 2]; 3];
-    let mut note = |way: usize, [start, ready, end]: [Instant; 3]| {
-        for (least, time) in least[way].iter_mut().zip([ready - start, end - ready]) {
-            *least = least.min(time.as_secs_f64());
-        }
-    };
     for _ in 0..rounds {
-        let start = Instant::now();
-        let by: BoxedMethod<Compiled> = catalogue::explicit("verner9", &free, false).unwrap();
-        let mut motion = Solver::new(&mut free, by, step, 0.0, q, &p).unwrap();
-        let ready = Instant::now();
-        motion.run(&mut free, time).unwrap();
-        note(0, [start, ready, Instant::now()]);
-        let start = Instant::now();
-        let by: BoxedMethod<Contacts> = catalogue::explicit("verner9", &system, false).unwrap();
-        let mut motion = Solver::new(&mut system, by, step, 0.0, q, &p).unwrap();
-        let ready = Instant::now();
-        motion.run(&mut system, time).unwrap();
-        note(1, [start, ready, Instant::now()]);
-        let start = Instant::now();
-        let by: BoxedMethod<Contacts> = catalogue::explicit("verner9", &system, false).unwrap();
-        let by = WithPostStep::new(&system, by, projection(&system));
-        let mut motion = Hybrid::new(&mut system, by, step, 0.0, q, &p).unwrap();
-        let ready = Instant::now();
-        motion.run(&mut system, time, &mut ()).unwrap();
-        note(2, [start, ready, Instant::now()]);
-        assert_eq!(motion.contact_statistics().events, 0);
+        let solver = |free: &mut Compiled| {
+            let by: BoxedMethod<Compiled> = catalogue::explicit("verner9", free, false).unwrap();
+            Solver::new(free, by, step, 0.0, q, &p).unwrap()
+        };
+        timed(&mut least[0], &mut free, solver, |motion, free| motion.run(free, time).unwrap());
+        let method =
+            |system: &Contacts| -> BoxedMethod<Contacts> { catalogue::explicit("verner9", system, false).unwrap() };
+        let solver = |system: &mut Contacts| Solver::new(system, method(system), step, 0.0, q, &p).unwrap();
+        timed(&mut least[1], &mut system, solver, |motion, system| motion.run(system, time).unwrap());
+        let hybrid = |system: &mut Contacts| {
+            let by = WithPostStep::new(system, method(system), projection(system));
+            Hybrid::new(system, by, step, 0.0, q, &p).unwrap()
+        };
+        timed(&mut least[2], &mut system, hybrid, |motion, system| {
+            motion.run(system, time, &mut ()).unwrap();
+            assert_eq!(motion.contact_statistics().events, 0);
+        });
     }
     least
 }
