@@ -1,17 +1,26 @@
-//! Generates the rates of legged robots, like branches together and apart.
+//! Generates the rates of legged robots and of mechanisms side by side, like branches together and apart.
 
+use mbd_codegen::model::{ConstraintKind, Model};
 use mbd_codegen::options::LikeBranches;
 use mbd_codegen::read::{self, Base, ImportOptions};
 use mbd_codegen::{generate::generate_from, search, Arithmetic, Options, Output};
 
+/// Files of `models`, how their roots are connected, and how many of them stand side by side on the ground.
+const SCENES: [(&str, &str, Base, usize); 4] = [
+    ("solo12", "solo12.urdf", Base::Floating, 1),
+    ("g1", "g1.urdf", Base::Floating, 1),
+    ("arms", "ur5.urdf", Base::Fixed, 2),
+    ("four_bars", "mechanisms/fourbar.toml", Base::Fixed, 50),
+];
+
 fn main() {
     let out = std::env::var("OUT_DIR").expect("cargo sets it");
-    for name in ["solo12", "g1"] {
-        let path = format!("../../models/{name}.urdf");
+    for (name, file, base, count) in SCENES {
+        let path = format!("../../models/{file}");
         println!("cargo:rerun-if-changed={path}");
         let text = std::fs::read_to_string(&path).expect("the model");
-        let model = read::model(&path, &text, &ImportOptions { base: Base::Floating, ..ImportOptions::default() });
-        let model = model.unwrap_or_else(|findings| panic!("{findings}")).model;
+        let model = read::model(&path, &text, &ImportOptions { base, ..ImportOptions::default() });
+        let model = side_by_side(&model.unwrap_or_else(|findings| panic!("{findings}")).model, count);
         let mut options = Options { outputs: vec![Output::Rates], ..Options::default() };
         let plan = search::plan(&model, options.searches());
         for arithmetic in [Arithmetic::Exact, Arithmetic::Fast] {
@@ -24,4 +33,36 @@ fn main() {
             }
         }
     }
+}
+
+/// Several of a mechanism on the ground, all in the same place: they do not touch.
+fn side_by_side(one: &Model, count: usize) -> Model {
+    let mut all = Model { name: "model".to_string(), ..one.clone() };
+    for k in 1..count {
+        let (bodies, joints) = (k * one.bodies.len(), k * one.joints.len());
+        let mut next = one.clone();
+        for name in next.bodies.iter_mut().map(|body| &mut body.name) {
+            *name = format!("{name}_{k}");
+        }
+        for joint in &mut next.joints {
+            joint.name = format!("{}_{k}", joint.name);
+            joint.parent = joint.parent.map(|body| body + bodies);
+            joint.child += bodies;
+        }
+        for constraint in &mut next.constraints {
+            constraint.name = format!("{}_{k}", constraint.name);
+            match &mut constraint.kind {
+                ConstraintKind::Loop { first, second, .. } => {
+                    [first, second].into_iter().filter_map(|end| end.body.as_mut()).for_each(|body| *body += bodies);
+                }
+                ConstraintKind::Coupling { terms, .. } => terms.iter_mut().for_each(|(joint, _)| *joint += joints),
+            }
+        }
+        next.starts.iter_mut().for_each(|start| start.joint += joints);
+        all.bodies.extend(next.bodies);
+        all.joints.extend(next.joints);
+        all.constraints.extend(next.constraints);
+        all.starts.extend(next.starts);
+    }
+    all
 }

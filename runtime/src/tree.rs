@@ -193,7 +193,7 @@ pub struct Node<S> {
 }
 
 /// A frame of interest, constant on a node or on the ground.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct TreeFrame<S> {
     /// Node, `None` for the ground.
     pub node: Option<usize>,
@@ -361,7 +361,7 @@ pub enum Closure<S> {
 }
 
 /// A constraint between two frames on bodies.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Cut<S> {
     /// What it holds together: points, axes, frames, or surfaces that touch.
     pub closure: Closure<S>,
@@ -378,7 +378,7 @@ pub struct Cut<S> {
 }
 
 /// The two frames or the joints that a constraint connects.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Bond<S> {
     /// Two frames.
     Cut(Cut<S>),
@@ -397,7 +397,7 @@ pub enum Bond<S> {
 pub const PASSES: [f64; 4] = [1e-1, 3e-3, 1e-4, 3e-6];
 
 /// Rows of `Φ v = b` that belong together.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Constraint<S> {
     /// The frames or joints that it connects.
     pub bond: Bond<S>,

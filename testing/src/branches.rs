@@ -25,7 +25,7 @@ pub const NUMBERS: [Numbers; 4] = [Numbers::Same, Numbers::Mirrored, Numbers::Di
 
 const KINDS: [&str; 4] = ["revolute", "prismatic", "spherical", "universal"];
 
-/// One body with its joint.
+/// One body with its joint; without a parent it hangs on the ground.
 fn body(text: &mut String, name: &str, parent: &str, kind: &str, rng: &mut Rng, scale: [f64; 3]) {
     let mut vector = |size: f64| scale.map(|s| s * (size + rng.around(0.5 * size)));
     let (xyz, com) = (vector(0.3), vector(0.1));
@@ -34,11 +34,96 @@ fn body(text: &mut String, name: &str, parent: &str, kind: &str, rng: &mut Rng, 
         "revolute" | "prismatic" => "axis = [0, 1, 0]\n".to_string(),
         _ => String::new(),
     };
+    let parent = if parent.is_empty() { String::new() } else { format!("parent = \"{parent}\"\n") };
     let _ = writeln!(
         text,
         "[[body]]\nname = \"{name}\"\nmass = {mass}\ncom = {com:?}\ninertia = [0.02, 0.03, 0.04]\n\n[[joint]]\nname = \
-         \"j_{name}\"\ntype = \"{kind}\"\nparent = \"{parent}\"\nchild = \"{name}\"\nxyz = {xyz:?}\n{axis}"
+         \"j_{name}\"\ntype = \"{kind}\"\n{parent}child = \"{name}\"\nxyz = {xyz:?}\n{axis}"
     );
+}
+
+/// What branches hang on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum On {
+    /// A floating body.
+    Trunk,
+    /// The ground.
+    Ground,
+}
+
+/// Two to six like branches with loops and couplings inside of each: a chain of revolute joints, and a rod beside it, on the first
+/// body of the chain (on the ground in the other case) with its end bound to that of the chain. Those on the ground are also
+/// bound to it.
+///
+/// # Panics
+/// If the reader refuses the text.
+pub fn with_loops(seed: u64, numbers: Numbers, on: On) -> Model {
+    let mut rng = Rng::new(seed, 4);
+    let mut text = "name = \"loops\"\ngravity = [0, 0, -9.81]\n\n".to_string();
+    let parent = match on {
+        On::Trunk => {
+            text += "[[body]]\nname = \"trunk\"\nmass = 5.0\ncom = [0.1, 0, 0.02]\ninertia = [0.2, 0.3, \
+                     0.4]\n\n[[joint]]\nname = \"base\"\ntype = \"floating\"\nchild = \"trunk\"\n\n";
+            "trunk"
+        }
+        On::Ground => "",
+    };
+    let (branches, length) = (2 + rng.below(5), 3 + rng.below(2));
+    let (kind, coupled, held) =
+        (rng.pick(&["distance", "point_on_plane", "point_on_line"]), rng.chance(0.5), rng.chance(0.5));
+    for branch in 0..branches {
+        let (mut own, scale) = of_branch(seed, branch, numbers);
+        let names: Vec<String> = (0..length).map(|k| format!("b{branch}_{k}")).collect();
+        for (k, name) in names.iter().enumerate() {
+            body(&mut text, name, if k == 0 { parent } else { &names[k - 1] }, "revolute", &mut own, scale);
+        }
+        let rod = format!("rod{branch}");
+        let root = if on == On::Ground { "" } else { names[0].as_str() };
+        body(&mut text, &rod, root, "spherical", &mut own, scale);
+        let size = 0.4 + own.around(0.1);
+        let number = match kind {
+            "distance" => format!("length = {size}\n"),
+            "point_on_line" => "axis = [0, 0, 1]\n".to_string(),
+            _ => "normal = [0, 0, 1]\n".to_string(),
+        };
+        let _ = writeln!(
+            text,
+            "[[frame]]\nname = \"end{branch}\"\nbody = \"{}\"\nxyz = [{size}, 0, 0]\n\n[[loop]]\nname = \
+             \"loop{branch}\"\ntype = \"{kind}\"\nbetween = [\"{rod}\", \"end{branch}\"]\n{number}",
+            names[length - 1]
+        );
+        if coupled {
+            let _ = writeln!(
+                text,
+                "[[coupling]]\nname = \"gears{branch}\"\njoints = [\"j_{}\", \"j_{}\"]\nratios = [1, {size}]\n",
+                names[1], names[2]
+            );
+        }
+        if held && on == On::Ground {
+            let _ = writeln!(
+                text,
+                "[[loop]]\nname = \"held{branch}\"\ntype = \"distance\"\nbetween = [\"ground\", \"{}\"]\nlength = \
+                 {size}\n",
+                names[1]
+            );
+        }
+    }
+    let options = ImportOptions::default();
+    read::model("loops.toml", &text, &options).unwrap_or_else(|findings| panic!("{findings}\n{text}")).model
+}
+
+/// The random numbers of a branch, and factors of its vectors.
+fn of_branch(seed: u64, branch: usize, numbers: Numbers) -> (Rng, [f64; 3]) {
+    let own = match numbers {
+        Numbers::Different => Rng::new(seed, 20 + branch as u64),
+        _ => Rng::new(seed, 20),
+    };
+    let scale = match numbers {
+        Numbers::Mirrored if branch % 2 == 1 => [1.0, -1.0, 1.0],
+        Numbers::ZerosInOne if branch == 1 => [1.0, 0.0, 1.0],
+        Numbers::Same | Numbers::Mirrored | Numbers::Different | Numbers::ZerosInOne => [1.0; 3],
+    };
+    (own, scale)
 }
 
 /// A floating body with two to six like branches, a branch that is like none, and branches on branches.
@@ -56,15 +141,7 @@ pub fn tree(seed: u64, numbers: Numbers) -> Model {
     let kinds: Vec<&str> = (0..length).map(|_| if rng.chance(0.7) { "revolute" } else { rng.pick(&KINDS) }).collect();
     let fingers = rng.chance(0.3);
     for branch in 0..branches {
-        let mut own = match numbers {
-            Numbers::Different => Rng::new(seed, 20 + branch as u64),
-            _ => Rng::new(seed, 20),
-        };
-        let scale = match numbers {
-            Numbers::Mirrored if branch % 2 == 1 => [1.0, -1.0, 1.0],
-            Numbers::ZerosInOne if branch == 1 => [1.0, 0.0, 1.0],
-            Numbers::Same | Numbers::Mirrored | Numbers::Different | Numbers::ZerosInOne => [1.0; 3],
-        };
+        let (mut own, scale) = of_branch(seed, branch, numbers);
         let mut parent = "trunk".to_string();
         for (k, kind) in kinds.iter().enumerate() {
             let name = format!("b{branch}_{k}");

@@ -16,6 +16,9 @@ use crate::rolled::Vectors;
 use crate::symbolic::angles::{nodes, Angles, Pairs};
 use crate::symbolic::{Label, Op, Program, ProgramResult};
 
+/// Places in memory that a loop may use: LLVM compares no more than 250 with each other (`alias-set-saturation-threshold`).
+const LOCATIONS: usize = 250;
+
 /// A program with names for its values and places for its results.
 pub struct Straight<'a> {
     plan: &'a Plan,
@@ -23,6 +26,8 @@ pub struct Straight<'a> {
     program: &'a Program,
     names: BTreeMap<u32, String>,
     angles: Angles,
+    /// Number of the inputs that the loop over lanes reads.
+    given: usize,
     /// How inputs are read, where they are not those of the function.
     sources: Option<&'a [String]>,
 }
@@ -41,7 +46,9 @@ impl<'a> Straight<'a> {
     /// Names every value after its body, quantity and component.
     pub fn new(plan: &'a Plan, program: &'a Program, head: Head<'a>) -> Self {
         let names = Names::default().straight(plan, program, head.inputs);
-        Straight { plan, head, program, names, angles: Angles::new(program), sources: None }
+        let angles = Angles::new(program);
+        let straight = Straight { plan, head, program, names, angles, given: 0, sources: None };
+        Straight { given: straight.given().count(), ..straight }
     }
 
     #[cfg(feature = "factored")]
@@ -55,14 +62,14 @@ impl<'a> Straight<'a> {
         sources: &'a [String],
     ) -> Self {
         let angles = Angles { late: crate::symbolic::angles::pairs(program), ..Angles::default() };
-        Straight { plan, head, program, names, angles, sources: Some(sources) }
+        Straight { plan, head, program, names, angles, given: 0, sources: Some(sources) }
     }
 
     #[cfg(feature = "factored")]
     /// The statements of a piece, and its results as they are written.
     pub fn write_piece(&self, out: &mut String) -> Vec<String> {
         let all = self.program.steps.iter().map(|(id, ..)| *id).collect();
-        self.write_steps(out, &all, true);
+        self.write_steps(out, &all, &BTreeMap::new(), true);
         self.program.outputs.iter().map(|result| self.head.value(result, &self.names)).collect()
     }
 
@@ -82,13 +89,49 @@ impl<'a> Straight<'a> {
             let _ =
                 writeln!(out, "        if LANES == 1 && {rt}::kernel::{condition} {{\n            {call}\n        }}");
         }
+        if self.in_one_array() {
+            let rows = self.head.rows(self.locations());
+            let _ = writeln!(out, "        let mut rows = {rows};");
+        }
         self.write_sines(out);
         self.write_given(out);
-        self.head.locals(out, "        ", "result", self.program.outputs.len());
+        if !self.in_one_array() {
+            self.head.locals(out, "        ", "result", self.program.outputs.len());
+        }
         let _ = writeln!(out, "        for l in 0..LANES {{");
-        self.write_steps(out, &self.angles.after, true);
+        let copied = self.given().enumerate().map(|(k, (id, _))| (id, k)).collect();
+        self.write_steps(out, &self.angles.after, &copied, true);
         self.write_results(out);
         let _ = writeln!(out, "    }}");
+    }
+
+    /// Numbers that the loop over lanes reads and writes: inputs, results, sines and cosines.
+    fn locations(&self) -> usize {
+        self.given + self.program.outputs.len() + 2 * self.angles.early.len()
+    }
+
+    /// Whether they are rows of one array.
+    fn in_one_array(&self) -> bool {
+        self.locations() > LOCATIONS
+    }
+
+    /// The row of an input of the loop over lanes, or of one of its results.
+    fn row(&self, name: &str, k: usize) -> String {
+        match (self.in_one_array(), name) {
+            (false, _) => format!("{name}_{k}"),
+            (true, "given") => format!("rows[{k}]"),
+            (true, _) => format!("rows[{}]", self.given + k),
+        }
+    }
+
+    /// The row of the sine or cosine of an angle that is known before the loop.
+    fn row_of_angle(&self, row: &str, k: usize) -> String {
+        let before = self.given + self.program.outputs.len();
+        match (self.in_one_array(), row) {
+            (false, _) => format!("{row}[{k}]"),
+            (true, "sines") => format!("rows[{}]", before + k),
+            (true, _) => format!("rows[{}]", before + self.angles.early.len() + k),
+        }
     }
 
     /// Sines and cosines of all angles that depend on inputs only.
@@ -97,27 +140,35 @@ impl<'a> Straight<'a> {
         if n == 0 {
             return;
         }
-        let _ = writeln!(out, "        let mut angles = {};\n        for l in 0..LANES {{", self.head.rows(n));
-        self.write_steps(out, &self.angles.before, false);
+        let _ = writeln!(out, "        let mut angles = {};", self.head.rows(n));
+        let mut copied = BTreeMap::new();
+        if self.in_one_array() {
+            // Its rows are free until the inputs of the other loop are copied.
+            let read = self.given_of(&self.angles.before).take(self.locations()).collect::<Vec<_>>();
+            self.write_copies(out, read.iter().map(|(_, k)| *k));
+            copied = read.iter().enumerate().map(|(k, (id, _))| (*id, k)).collect();
+        }
+        let _ = writeln!(out, "        for l in 0..LANES {{");
+        self.write_steps(out, &self.angles.before, &copied, false);
         for (k, angle) in self.angles.early.keys().enumerate() {
             let _ = writeln!(out, "            angles[{k}][l] = {};", self.names[angle]);
         }
         let _ = writeln!(out, "        }}");
         let _ = writeln!(out, "        let (sines, cosines) = {};", self.head.sines_and_cosines("angles", n));
+        if self.in_one_array() {
+            for (name, k) in ["sines", "cosines"].into_iter().flat_map(|name| (0..n).map(move |k| (name, k))) {
+                let _ = writeln!(out, "        {} = {name}[{k}];", self.row_of_angle(name, k));
+            }
+        }
     }
 
     /// Those of the program's steps that are in a set, in order. Many statements are written in blocks that return the
     /// values that are needed after them: each `let` is a scope inside the one before it, and debug information of
     /// thousands of them is deeper than the compiler's stack.
-    fn write_steps(&self, out: &mut String, set: &BTreeSet<u32>, lanes: bool) {
+    fn write_steps(&self, out: &mut String, set: &BTreeSet<u32>, copied: &BTreeMap<u32, usize>, lanes: bool) {
         let mut late = self.angles.late.clone();
-        // Inputs are copied for the loop over lanes only.
-        let given = match lanes && self.sources.is_none() {
-            true => self.given().enumerate().map(|(k, (id, _))| (id, k)).collect(),
-            false => BTreeMap::new(),
-        };
         let steps = self.program.steps.iter().filter(|(id, _, _)| set.contains(id));
-        let statements: Vec<Statement> = steps.filter_map(|step| self.statement(step, &given, &mut late)).collect();
+        let statements: Vec<Statement> = steps.filter_map(|step| self.statement(step, copied, &mut late)).collect();
         let chunk = self.head.options.chunk.max(1);
         if statements.len() <= chunk {
             return self.write_statements(out, &statements, lanes, "            ");
@@ -162,13 +213,13 @@ impl<'a> Straight<'a> {
     fn statement(
         &self,
         (id, op, label): &(u32, Op, Label),
-        given: &BTreeMap<u32, usize>,
+        copied: &BTreeMap<u32, usize>,
         late: &mut Pairs,
     ) -> Option<Statement> {
         let (name, is_input) = (&self.names[id], matches!(op, Op::Input(_)));
         let own = |text: String, uses| Some(Statement { text, makes: vec![*id], uses, label: *label, is_input });
-        if let Some(k) = given.get(id) {
-            return own(format!("let {name} = given_{k}[l];"), Vec::new());
+        if let Some(k) = copied.get(id) {
+            return own(format!("let {name} = {}[l];", self.row("given", *k)), Vec::new());
         }
         let (angle, row) = match op {
             Op::Sin(a) => (a, "sines"),
@@ -183,7 +234,7 @@ impl<'a> Straight<'a> {
             op => return own(format!("let {name} = {};", self.head.expression(op, &self.names)), nodes(op).collect()),
         };
         if let Some(k) = self.angles.early.keys().position(|a| a == angle) {
-            return own(format!("let {name} = {row}[{k}][l];"), Vec::new());
+            return own(format!("let {name} = {}[l];", self.row_of_angle(row, k)), Vec::new());
         }
         // The first one of a pair represents both.
         let pair = late.remove(angle)?;
@@ -195,27 +246,39 @@ impl<'a> Straight<'a> {
 
     /// Inputs of the loop over lanes.
     fn given(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        self.given_of(&self.angles.after)
+    }
+
+    /// Inputs among some steps: node, and number of the input.
+    fn given_of<'s>(&'s self, set: &'s BTreeSet<u32>) -> impl Iterator<Item = (u32, u32)> + 's {
         self.program.steps.iter().filter_map(|(id, op, _)| match op {
-            Op::Input(k) if self.angles.after.contains(id) => Some((*id, *k)),
+            Op::Input(k) if set.contains(id) => Some((*id, *k)),
             _ => None,
         })
+    }
+
+    /// Copies inputs into rows.
+    fn write_copies(&self, out: &mut String, inputs: impl Iterator<Item = u32>) {
+        for (to, k) in inputs.enumerate() {
+            let from = self.head.input(k as usize, "", "l");
+            let _ = writeln!(out, "        for l in 0..LANES {{ {}[l] = {from}; }}", self.row("given", to));
+        }
     }
 
     /// Inputs are copied first, as results are written last: the loop over lanes then uses memory that nothing else can
     /// point to, and the compiler vectorises it without run-time checks for overlap.
     fn write_given(&self, out: &mut String) {
-        self.head.locals(out, "        ", "given", self.given().count());
-        for (to, (_, k)) in self.given().enumerate() {
-            let from = self.head.input(k as usize, "", "l");
-            let _ = writeln!(out, "        for l in 0..LANES {{ given_{to}[l] = {from}; }}");
+        if !self.in_one_array() {
+            self.head.locals(out, "        ", "given", self.given);
         }
+        self.write_copies(out, self.given().map(|(_, k)| k));
     }
 
     /// Results are collected in arrays before they are written to the arguments.
     fn write_results(&self, out: &mut String) {
         for (k, result) in self.program.outputs.iter().enumerate() {
             let value = self.head.value(result, &self.names);
-            let _ = writeln!(out, "            result_{k}[l] = {value};");
+            let _ = writeln!(out, "            {}[l] = {value};", self.row("result", k));
         }
         let _ = writeln!(out, "        }}");
         let places = self.head.places();
@@ -224,11 +287,12 @@ impl<'a> Straight<'a> {
             // Two at once where they stand beside one another.
             at += match places.get(at + 1) {
                 Some((next, _)) if next == name => {
-                    let _ = writeln!(out, "        {name}.give_pair({k}, [&result_{at}, &result_{}]);", at + 1);
+                    let [first, second] = [at, at + 1].map(|at| self.row("result", at));
+                    let _ = writeln!(out, "        {name}.give_pair({k}, [&{first}, &{second}]);");
                     2
                 }
                 _ => {
-                    let _ = writeln!(out, "        {name}.give({k}, &result_{at});");
+                    let _ = writeln!(out, "        {name}.give({k}, &{});", self.row("result", at));
                     1
                 }
             };

@@ -3,13 +3,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mbd_runtime::tree::{Source, Tree};
+use mbd_runtime::tree::{Source, Tree, Unknown};
 
 use super::link::Link;
 use super::main_line::{Event, MainLine};
 use super::partition::{assemble, output, partition, Body, Requests};
 use super::pass_state::{OutputSweeps, PassState};
-use super::runs::Run;
+use super::runs::{Extent, Run};
 use super::{Block, Loop, Place, Repeat, RolledProgram, Start, Target};
 use crate::options::Options;
 use crate::output::{Dim, InputArray, Output, OutputProgram};
@@ -34,38 +34,62 @@ pub fn build(
         (Output::Accelerations, Some(other)) => (&**other, tree.for_accelerations().clone()),
         _ => (plan, tree),
     };
-    let passes = sweeps.passes(&tree)?;
     let allowed: Vec<bool> = plan_of_tree.nodes.iter().map(|n| n.rolled).collect();
     let runs: Vec<Run> = find(&tree, &allowed).into_iter().filter(|run| steady(&tree, run)).collect();
     if runs.is_empty() {
         return None;
     }
-    let starts: Vec<(usize, usize)> = runs.iter().map(|run| state_of(&tree, run.nodes.start)).collect();
+    let passes = sweeps.all_passes(&tree);
+    let tree = without_inner(tree, &runs);
+    if runs.iter().any(|run| run.branches.is_none()) && !sweeps.rolls(&tree) {
+        return None;
+    }
+    let starts: Vec<Extent> = runs.iter().map(|run| start_of(&tree, run)).collect();
     let graphs: Vec<Graph> = runs.iter().map(|_| Graph::default()).collect();
     let link = |(graph, run)| Link::new(graph, group, run, &tree, options.efforts, &passes);
     let mut links: Vec<Link> = graphs.iter().zip(&runs).map(link).collect::<Option<_>>()?;
     let next_input = given.arrays.iter().map(InputArray::len).sum();
     let stage = PassState::new(group, &graph, tree, &passes)?;
+    let last = passes.len().saturating_sub(1);
     let mut line =
-        MainLine { graph: &graph, stage, given, runs: &runs, events: Vec::new(), next_input, passed_on: false };
+        MainLine { graph: &graph, stage, given, runs: &runs, events: Vec::new(), next_input, unfit: false, last };
     for (number, pass) in passes.iter().enumerate() {
         line.pass(number, pass.direction, &mut links);
     }
     // What adds up over all nodes has an order, in which branches do not wait for each other.
-    let mut adds_up = false;
-    (0..passes.len()).for_each(|pass| line.stage.running(pass, &line.given, |_| adds_up = true));
-    if (adds_up || line.passed_on) && runs.iter().any(|run| run.branches.is_some()) {
+    if (group == Output::Energy || line.unfit) && runs.iter().any(|run| run.branches.is_some()) {
         return None;
     }
     let results = line.stage.finish(&line.given);
     let own: Vec<Vec<(Expr, Target)>> = links
         .iter_mut()
-        .zip(&starts)
-        .map(|(link, start)| results_of_turn(plan, group, options, link, *start))
+        .zip(starts.iter().zip(&runs))
+        .map(|(link, (start, run))| results_of_turn(plan, group, options, link, (*start, run.branches.is_some())))
         .collect();
     let mut build = Build { line: &line, graphs: &graphs, links: &links, starts: &starts, own, results };
     let program = build.program(options);
     Some(OutputProgram { spec: group.spec(), inputs: line.given.arrays, program })
+}
+
+/// The tree without the constraints inside of branches, in which nothing else asks for them.
+fn without_inner<'g>(mut tree: Tree<Expr<'g>>, runs: &[Run]) -> Tree<Expr<'g>> {
+    for run in runs {
+        let Some(branches) = &run.branches else { continue };
+        for turn in 0..run.count() {
+            let first = branches.first.rows + turn * branches.stride.rows;
+            let rows = first..first + branches.size.rows;
+            tree.constraints.retain(|c| !rows.contains(&c.first));
+            let unknowns = &tree.unknowns;
+            tree.solve_at_ground.retain(|&g| !matches!(unknowns[g], Unknown::Row(row) if rows.contains(&row)));
+        }
+    }
+    tree
+}
+
+/// First coordinate, velocity and row of a run.
+fn start_of(tree: &Tree<Expr>, run: &Run) -> Extent {
+    let (q, v) = state_of(tree, run.nodes.start);
+    run.branches.as_ref().map_or(Extent { q, v, rows: 0 }, |branches| branches.first)
 }
 
 /// First coordinate and velocity of a node.
@@ -95,7 +119,7 @@ fn results_of_turn<'g>(
     group: Output,
     options: &Options,
     link: &mut Link<'g, '_>,
-    start: (usize, usize),
+    (start, branches): (Extent, bool),
 ) -> Vec<(Expr<'g>, Target)> {
     let sizes = sizes(plan, options, 0);
     let mut offset = 0;
@@ -103,8 +127,9 @@ fn results_of_turn<'g>(
     let mut results = link.finish().into_iter();
     for array in group.spec().results {
         let turn = match array.dims {
-            [Dim::Nq] => Some((start.0, link.size.0, link.stride.0)),
-            [Dim::Nv] => Some((start.1, link.size.1, link.stride.1)),
+            [Dim::Nq] => Some((start.q, link.size.q, link.stride.q)),
+            [Dim::Nv] => Some((start.v, link.size.v, link.stride.v)),
+            [Dim::Rows] if branches => Some((start.rows, link.size.rows, link.stride.rows)),
             _ => None,
         };
         let len = array.len(&sizes);
@@ -125,7 +150,7 @@ pub(super) struct Build<'b, 'm, 'g> {
     pub(super) line: &'b MainLine<'m, 'b>,
     pub(super) graphs: &'g [Graph],
     pub(super) links: &'b [Link<'g, 'b>],
-    starts: &'b [(usize, usize)],
+    starts: &'b [Extent],
     own: Vec<Vec<(Expr<'g>, Target)>>,
     results: Vec<Expr<'m>>,
 }
@@ -205,7 +230,7 @@ impl<'m> Build<'_, 'm, '_> {
         let mut rows = Vec::new();
         for (k, run) in self.line.runs.iter().enumerate() {
             let given = &self.line.given;
-            let (q, v) = self.starts[k];
+            let Extent { q, v, .. } = self.starts[k];
             let wanted = Requests {
                 results: self.own[k].clone(),
                 carried: &live.carried[k],

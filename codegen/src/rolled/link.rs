@@ -1,6 +1,8 @@
 //! One turn of a run by itself: a dummy node in the place of the rest of the tree, and the links of one period behind
 //! it, taken through the passes with symbols for what they carry in.
 
+use std::collections::BTreeMap;
+
 use mbd_runtime::spatial::RigidInertia;
 use mbd_runtime::sweep::pass::Pass;
 use mbd_runtime::tree::{
@@ -9,7 +11,7 @@ use mbd_runtime::tree::{
 use mbd_runtime::Scalar;
 
 use super::pass_state::{read, PassState};
-use super::runs::{map_node, Run, Slot};
+use super::runs::{map_constraint, map_node, Extent, Run, Slot};
 use super::turn_constants::constant;
 use super::twins::{signed, value, Twin, Twins};
 use super::SweepDirection;
@@ -58,10 +60,10 @@ pub struct Link<'g, 'a> {
     pub inputs: Vec<LinkInput>,
     /// Passes done that carry something.
     pub passes: Vec<LinkPass<'g>>,
-    /// Coordinates and velocities of one turn.
-    pub size: (usize, usize),
-    /// By how much the first coordinate and the first velocity move on from turn to turn.
-    pub stride: (usize, usize),
+    /// Coordinates, velocities and rows of one turn.
+    pub size: Extent,
+    /// By how much the first coordinate, velocity and row move on from turn to turn.
+    pub stride: Extent,
 }
 
 impl<'g, 'a> Link<'g, 'a> {
@@ -81,13 +83,17 @@ impl<'g, 'a> Link<'g, 'a> {
             (first..first + n).map(|k| graph.input(k)).collect()
         };
         let columns = symbols(&LinkInput::Column, run.table[0].len());
+        let mut slot = |slot| match slot {
+            Slot::Const(x) => Expr::Const(x),
+            Slot::Column(c) => columns[c],
+        };
         let (mut nq, mut nv) = (0, 0);
-        let mut nodes = vec![dummy(run.branches.as_ref().is_some_and(|b| b.accumulates))];
+        let mut nodes = match &run.branches {
+            Some(branches) if branches.parent.is_none() => Vec::new(),
+            branches => vec![dummy(branches.as_ref().is_some_and(|b| b.accumulates))],
+        };
         for (k, node) in run.template.iter().enumerate() {
-            let mut node = map_node(node, &mut |slot| match slot {
-                Slot::Const(x) => Expr::Const(x),
-                Slot::Column(c) => columns[c],
-            });
+            let mut node = map_node(node, &mut slot);
             if run.branches.is_none() {
                 node.parent = Some(k);
                 node.source = Source::State { q: nq, v: nv };
@@ -95,8 +101,9 @@ impl<'g, 'a> Link<'g, 'a> {
             }
             nodes.push(node);
         }
-        let stride = run.branches.as_ref().map_or((nq, nv), |b| b.stride);
-        (nq, nv) = run.branches.as_ref().map_or((nq, nv), |b| b.size);
+        let own = Extent { q: nq, v: nv, rows: 0 };
+        let (size, stride) = run.branches.as_ref().map_or((own, own), |b| (b.size, b.stride));
+        (nq, nv) = (size.q, size.v);
         let zero = Expr::zero();
         let given = SymbolicInputs {
             arrays: Vec::new(),
@@ -111,25 +118,31 @@ impl<'g, 'a> Link<'g, 'a> {
             gravity: [zero; 3],
             acts: Vec::new(),
         };
-        let dims = Dims { nq, nv, rows: tree.dims.rows, ..Dims::default() };
-        let constraints: Vec<_> = tree.constraints.iter().map(|c| stand_in(c, run)).collect();
-        // Numbered as in the tree; coordinates are open nowhere in a run.
-        let row = |shared: &Unknown| if let Unknown::Row(_) = shared { *shared } else { Unknown::Row(0) };
-        let shared = match &run.branches {
-            Some(branches) => branches.unknowns.clone(),
-            None if constraints.is_empty() => Vec::new(),
-            None => tree.unknowns.iter().map(row).collect(),
+        let constraints: Vec<Constraint<Expr<'g>>> = match run.branches {
+            Some(_) => run.constraints.iter().map(|c| map_constraint(c, &mut slot)).collect(),
+            None => tree.constraints.iter().map(|c| stand_in(c, run)).collect(),
         };
+        // In a chain, numbered as in the tree; coordinates are open nowhere in it.
+        let row = |shared: &Unknown| if let Unknown::Row(_) = shared { *shared } else { Unknown::Row(0) };
+        let (rows, shared, solve_at_ground) = match &run.branches {
+            Some(branches) => (size.rows, branches.unknowns.clone(), branches.solve_at_ground.clone()),
+            None if constraints.is_empty() => (tree.dims.rows, Vec::new(), Vec::new()),
+            None => (tree.dims.rows, tree.unknowns.iter().map(row).collect(), Vec::new()),
+        };
+        let dims = Dims { nq, nv, rows, ..Dims::default() };
         let tree = Tree {
             nodes,
             dims,
             unknowns: shared,
-            solve_at_ground: Vec::new(),
+            solve_at_ground,
             ground_moment: [zero; 3],
             wrenches: Vec::new(),
             constraints,
-            tolerance: Expr::rank_tolerance(),
-            early_tolerance: None,
+            tolerance: match tree.tolerance {
+                Expr::Const(x) => Expr::Const(x),
+                Expr::Node { .. } => Expr::rank_tolerance(),
+            },
+            early_tolerance: tree.early_tolerance,
             row_factors: None,
             frames: Vec::new(),
             joint_nodes: Vec::new(),
@@ -138,7 +151,7 @@ impl<'g, 'a> Link<'g, 'a> {
         };
         let stage = PassState::new(group, graph, tree, passes)?;
         let nodes = run.period;
-        Some(Link { graph, stage, given, nodes, inputs, passes: Vec::new(), size: (nq, nv), stride })
+        Some(Link { graph, stage, given, nodes, inputs, passes: Vec::new(), size, stride })
     }
 
     /// A pass, carrying in `first` at its first turn. What is constant there and stays so from turn to turn is a
@@ -231,33 +244,79 @@ impl<'g, 'a> Link<'g, 'a> {
     }
 
     /// A pass through a branch: outward with what the parent hands to all branches, inward with what each hands to the
-    /// parent.
-    pub fn pass_of_branch(&mut self, pass: usize, direction: SweepDirection, from_parent: &[Expr<'_>]) {
+    /// parent. `keys` tell which numbers these are, as [`PassState::carried_by_sweeps`] gives them. `None`: a branch hands on
+    /// others.
+    pub fn pass_of_branch(
+        &mut self,
+        pass: usize,
+        direction: SweepDirection,
+        (keys, from_parent): (&[[usize; 2]], &[Expr<'_>]),
+    ) -> Option<()> {
         let number = self.passes.len();
         self.stage.begin(pass, &self.given);
-        let symbols = from_parent.iter().enumerate().map(|(k, first)| match (*first, self.symbol(number, k)) {
-            (Expr::Const(x), _) => Expr::Const(x),
-            (Expr::Node { .. }, symbol) => symbol,
-        });
-        let incoming: Vec<Expr<'g>> = symbols.collect();
-        let mut outgoing = Vec::new();
+        let incoming = self.taken_in(number, from_parent);
+        let mut all = BTreeMap::new();
         let (given, outer) = (&self.given, self.nodes);
         match direction {
             SweepDirection::BaseToTip => {
-                let mut next = incoming.iter();
-                let mut next = || *next.next().expect("a pass takes in as much as the parent hands on");
-                self.stage.carried(pass, 0, given, |e| *e = next());
+                let next: BTreeMap<[usize; 2], Expr<'g>> = keys.iter().copied().zip(incoming.iter().copied()).collect();
+                self.stage.carried_by_sweeps(pass, 0, given, |key, e| {
+                    if let Some(next) = next.get(&key) {
+                        *e = *next;
+                    }
+                });
                 (1..=outer).for_each(|i| self.stage.node(pass, i, given));
+                self.stage.end(pass, given);
             }
             SweepDirection::TipToBase => {
                 (1..=outer).rev().for_each(|i| self.stage.node(pass, i, given));
-                outgoing = read(|visit| self.stage.carried(pass, 0, given, visit));
+                self.stage.end(pass, given);
+                self.stage.carried_by_sweeps(pass, 0, given, |key, e| {
+                    all.insert(key, *e);
+                });
             }
+        }
+        let inward = if direction == SweepDirection::TipToBase { keys } else { &[] };
+        let outgoing: Vec<Expr<'g>> = inward.iter().map(|key| all.remove(key)).collect::<Option<_>>()?;
+        // Columns of rows that are solved in the branch stay in it.
+        if !all.values().all(|e| matches!(e, Expr::Const(x) if *x == 0.0)) {
+            return None;
         }
         let negative: Vec<bool> = outgoing.iter().map(|e| matches!(e, Expr::Node { neg: true, .. })).collect();
         let outgoing = symbols_of(&outgoing);
         let twins = vec![None; outgoing.len()];
         self.passes.push(LinkPass { incoming, twins, outgoing, negative, end: self.graph.len() });
+        Some(())
+    }
+
+    /// A pass through a mechanism on the ground, which takes in nothing but gravity. All of them are one pass of the link, which is
+    /// done when the `last` one is.
+    pub fn pass_on_ground(&mut self, (pass, last): (usize, usize), direction: SweepDirection, gravity: &[Expr<'_>]) {
+        if pass == 0 {
+            let gravity = self.taken_in(0, gravity);
+            self.given.gravity.copy_from_slice(&gravity);
+        }
+        let given = &self.given;
+        self.stage.begin(pass, given);
+        match direction {
+            SweepDirection::BaseToTip => (0..self.nodes).for_each(|i| self.stage.node(pass, i, given)),
+            SweepDirection::TipToBase => (0..self.nodes).rev().for_each(|i| self.stage.node(pass, i, given)),
+        }
+        self.stage.end(pass, given);
+        if pass == last {
+            let incoming = self.given.gravity.to_vec();
+            let (twins, outgoing, negative) = (vec![None; incoming.len()], Vec::new(), Vec::new());
+            self.passes.push(LinkPass { incoming, twins, outgoing, negative, end: self.graph.len() });
+        }
+    }
+
+    /// Symbols for what all branches take in in pass number `number`; constants stay what they are.
+    fn taken_in(&mut self, number: usize, first: &[Expr<'_>]) -> Vec<Expr<'g>> {
+        let symbols = first.iter().enumerate().map(|(k, first)| match (*first, self.symbol(number, k)) {
+            (Expr::Const(x), _) => Expr::Const(x),
+            (Expr::Node { .. }, symbol) => symbol,
+        });
+        symbols.collect()
     }
 
     /// What a pass hands on, as far as it depends on constants alone, in the turn with a given row of the table.

@@ -41,8 +41,11 @@ pub struct MainLine<'m, 'a> {
     pub events: Vec<Event<'m>>,
     /// Number of the next symbol.
     pub next_input: usize,
-    /// Whether a branch takes in what another one hands over unchanged, which has no place between loops.
-    pub passed_on: bool,
+    /// Whether branches cannot be computed in loops: one takes in what another one hands over unchanged, which has no place
+    /// between loops, or hands over what its parent does not take.
+    pub unfit: bool,
+    /// Number of the last pass.
+    pub last: usize,
 }
 
 impl<'m> MainLine<'m, '_> {
@@ -163,38 +166,65 @@ impl<'m> MainLine<'m, '_> {
             SweepDirection::BaseToTip => 0,
         };
         if turn == met_first {
-            let event = self.branches(k, branches.parent, pass, direction, &mut links[k]);
-            self.events.push(event);
+            let event = match branches.parent {
+                Some(parent) => self.branches((k, parent), pass, direction, &mut links[k]),
+                None => self.on_ground(k, pass, direction, &mut links[k]),
+            };
+            self.events.extend(event);
         }
+        let Some(parent) = branches.parent else { return true };
         let of_run = self.events.iter().rev().find(|event| event.run == k);
         if let (SweepDirection::TipToBase, Some(event)) = (direction, of_run) {
             let mut handed = event.handed[turn].iter();
-            let mut next = || *handed.next().expect("a branch hands on as much as its parent takes in");
-            self.stage.carried(pass, branches.parent, &self.given, |e| *e = *e + next());
+            // Less is at hand only where the branches are unfit.
+            self.stage.carried(pass, parent, &self.given, |e| {
+                if let Some(share) = handed.next() {
+                    *e = *e + *share;
+                }
+            });
         }
         true
     }
 
-    fn branches(
-        &mut self,
+    /// A pass through like mechanisms on the ground: an event when all passes are done.
+    fn on_ground(
+        &self,
         k: usize,
-        parent: usize,
         pass: usize,
         direction: SweepDirection,
         link: &mut Link<'_, '_>,
-    ) -> Event<'m> {
-        let (stage, given) = (&mut self.stage, &self.given);
-        let start = match direction {
-            SweepDirection::TipToBase => Vec::new(),
-            SweepDirection::BaseToTip => read(|visit| stage.carried(pass, parent, given, visit)),
-        };
+    ) -> Option<Event<'m>> {
+        let start = self.given.gravity.to_vec();
+        link.pass_on_ground((pass, self.last), direction, &start);
+        let (at, handed) = (self.graph.len(), Vec::new());
+        (pass == self.last).then_some(Event { at, run: k, pass: 0, direction, start, end: Vec::new(), handed })
+    }
+
+    fn branches(
+        &mut self,
+        (k, parent): (usize, usize),
+        pass: usize,
+        direction: SweepDirection,
+        link: &mut Link<'_, '_>,
+    ) -> Option<Event<'m>> {
+        let (mut keys, mut start) = (Vec::new(), Vec::new());
+        self.stage.carried_by_sweeps(pass, parent, &self.given, |key, e| {
+            keys.push(key);
+            start.push(*e);
+        });
+        if direction == SweepDirection::TipToBase {
+            start.clear();
+        }
         let given: usize = self.given.arrays.iter().map(InputArray::len).sum();
-        self.passed_on |= start.iter().any(|e| match *e {
+        self.unfit |= start.iter().any(|e| match *e {
             Expr::Node { id, .. } => matches!(self.graph.get(id).0, Op::Input(k) if k as usize >= given),
             Expr::Const(_) => false,
         });
         let at = self.graph.len();
-        link.pass_of_branch(pass, direction, &start);
+        if link.pass_of_branch(pass, direction, (&keys, &start)).is_none() {
+            self.unfit = true;
+            return None;
+        }
         let number = link.passes.len() - 1;
         let negative = &link.passes[number].negative;
         let mut handed = Vec::new();
@@ -209,6 +239,6 @@ impl<'m> MainLine<'m, '_> {
             });
             handed.push(shares.collect());
         }
-        Event { at, run: k, pass: number, direction, start, end: Vec::new(), handed }
+        Some(Event { at, run: k, pass: number, direction, start, end: Vec::new(), handed })
     }
 }

@@ -102,7 +102,7 @@ pub fn assemble<P, T: Copy>(
 pub fn partition(graph: &Graph, link: &Link<'_, '_>, run: &Run, live: &[bool], wanted: &Requests<'_, '_>) -> Code {
     let ranks = if run.branches.is_some() { ranks_in_branch(graph, link) } else { ranks(graph, link) };
     let passes = link.passes.len();
-    let (columns, table) = columns(graph, link, run, live, &ranks);
+    let (columns, table) = columns(graph, link, run, (live, &wanted.results), &ranks);
     // Outputs of every pass that leave the turn.
     let mut outputs: Vec<Vec<(ProgramResult, Target)>> = vec![Vec::new(); passes];
     let mut places = BTreeMap::new();
@@ -155,10 +155,10 @@ pub fn partition(graph: &Graph, link: &Link<'_, '_>, run: &Run, live: &[bool], w
         (_, _, _, Some(row)) => Place::Row(*row),
         (Op::Input(k), ..) => {
             let (first, stride) = match link.inputs[k as usize] {
-                LinkInput::Q(k) => (wanted.first[0] + k, link.stride.0),
-                LinkInput::Second(k) => (wanted.first[1] + k, link.stride.1),
-                LinkInput::Third(k) => (wanted.first[2] + k, link.stride.1),
-                LinkInput::Tau(k) => (wanted.first[3] + k, link.stride.1),
+                LinkInput::Q(k) => (wanted.first[0] + k, link.stride.q),
+                LinkInput::Second(k) => (wanted.first[1] + k, link.stride.v),
+                LinkInput::Third(k) => (wanted.first[2] + k, link.stride.v),
+                LinkInput::Tau(k) => (wanted.first[3] + k, link.stride.v),
                 LinkInput::Column(_) | LinkInput::Carried(..) => {
                     unreachable!("constants and what is carried have places")
                 }
@@ -238,7 +238,7 @@ fn columns(
     graph: &Graph,
     link: &Link<'_, '_>,
     run: &Run,
-    live: &[bool],
+    (live, results): (&[bool], &[(Expr<'_>, Target)]),
     ranks: &[Rank],
 ) -> (BTreeMap<u32, usize>, Vec<Vec<f64>>) {
     let constant = |id: u32| ranks[id as usize] == Rank::Constant;
@@ -246,7 +246,7 @@ fn columns(
     for id in (0..graph.len() as u32).filter(|&id| live[id as usize] && !constant(id)) {
         read.extend(nodes(&graph.get(id).0).filter(|&id| constant(id)));
     }
-    let roots = link.passes.iter().flat_map(|p| &p.outgoing);
+    let roots = link.passes.iter().flat_map(|p| &p.outgoing).chain(results.iter().map(|(e, _)| e));
     for e in roots {
         if let Expr::Node { id, .. } = *e {
             if constant(id) {

@@ -39,10 +39,9 @@ impl<'g> OutputSweeps<'g> {
         mbd_runtime::sweep::pass::passes(&self.sweeps, tree)
     }
 
-    /// The passes that a tree needs, if links can carry all of its sweeps.
-    pub fn passes(&self, tree: &Tree<Expr<'g>>) -> Option<Vec<Pass>> {
-        let passes = self.all_passes(tree);
-        passes.iter().flat_map(|pass| &pass.sweeps).all(|&k| (self.sweeps[k].rolls)(tree)).then_some(passes)
+    /// Whether links of a tree can carry all sweeps that it needs.
+    pub fn rolls(&self, tree: &Tree<Expr<'g>>) -> bool {
+        self.sweeps.iter().filter(|sweep| (sweep.needed)(tree)).all(|sweep| (sweep.rolls)(tree))
     }
 }
 
@@ -158,7 +157,6 @@ impl<'g, 'a> PassState<'g, 'a> {
         self.each(pass, given, |sweep, cx| (sweep.carried)(cx, i, &mut visit));
     }
 
-    #[cfg(feature = "factored")]
     /// The same with the number of the sweep among those of the output, and that of the value among those of the sweep.
     pub fn carried_by_sweeps(
         &mut self,

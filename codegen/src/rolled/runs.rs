@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use mbd_runtime::spatial::ElementaryTransform;
-use mbd_runtime::tree::{Bond, Elimination, Node, Source, Tree, Unknown};
+use mbd_runtime::tree::{Bond, Constraint, Cut, Elimination, Node, Source, Tree, TreeFrame, Unknown};
 
 use crate::symbolic::Expr;
 
@@ -20,27 +20,45 @@ pub struct Run {
     pub period: usize,
     /// One node of the period each: constants common to all turns, and the others as columns of the table.
     pub(super) template: Vec<Node<Slot>>,
+    /// Constraints between the nodes of a turn, or between these and the ground, with constants as in the nodes.
+    pub(super) constraints: Vec<Constraint<Slot>>,
     /// One row for each turn of the loop, columns as the template numbers them.
     pub table: Vec<Vec<f64>>,
-    /// Set where the turns are branches of one node instead of links of a chain.
+    /// Set where the turns are branches of one node or of the ground instead of links of a chain.
     pub branches: Option<Branches>,
 }
 
-/// Turns that are like branches of one node. [`Run::nodes`] and [`Run::period`] are those of the first of them.
+/// Turns that are like branches of one node, or mechanisms on the ground that no constraint binds to one another.
+/// [`Run::nodes`] and [`Run::period`] are those of the first of them.
 #[derive(Clone, Debug)]
 pub struct Branches {
-    /// The node that all of them hang on.
-    pub parent: usize,
+    /// The node that all of them hang on; `None` for the ground.
+    pub parent: Option<usize>,
     /// First node of each, in ascending order.
     pub roots: Vec<usize>,
-    /// By how much the first coordinate and the first velocity move on from branch to branch.
-    pub stride: (usize, usize),
-    /// Coordinates and velocities of one branch.
-    pub size: (usize, usize),
-    /// Unknowns of a branch, by its own velocities.
+    /// By how much the first coordinate, velocity and row move on from branch to branch.
+    pub stride: Extent,
+    /// Those of the first branch begin here.
+    pub(super) first: Extent,
+    /// How many one branch has.
+    pub size: Extent,
+    /// Unknowns of a branch, by its own velocities and rows.
     pub(super) unknowns: Vec<Unknown>,
+    /// Those of them that are solved at the ground.
+    pub(super) solve_at_ground: Vec<usize>,
     /// Whether the momentum of the branches is accumulated at their parent.
     pub(super) accumulates: bool,
+}
+
+/// A number of coordinates, of velocities and of rows of constraints.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Extent {
+    /// Coordinates.
+    pub q: usize,
+    /// Velocities.
+    pub v: usize,
+    /// Rows.
+    pub rows: usize,
 }
 
 /// A constant of a link.
@@ -50,6 +68,14 @@ pub enum Slot {
     Const(f64),
     /// Column of the table.
     Column(usize),
+}
+
+impl Extent {
+    /// By how much it is more than another one; `None` where it is less.
+    pub fn checked_sub(self, other: Extent) -> Option<Extent> {
+        let q = self.q.checked_sub(other.q)?;
+        Some(Extent { q, v: self.v.checked_sub(other.v)?, rows: self.rows.checked_sub(other.rows)? })
+    }
 }
 
 impl Run {
@@ -275,35 +301,71 @@ fn tabulate(links: &[Node<f64>], nodes: Range<usize>, period: usize) -> Option<R
             .collect::<Option<Vec<_>>>()?;
         template.push(columns_of(&like, &mut table));
     }
-    Some(Run { nodes, period, template, table, branches: None })
+    Some(Run { nodes, period, template, constraints: Vec::new(), table, branches: None })
 }
 
 /// One node of the template from its likes in all turns, each of which has the same steps: constants that differ get
 /// a column of the table.
 pub(super) fn columns_of(like: &[Node<f64>], table: &mut [Vec<f64>]) -> Node<Slot> {
-    let rows: Vec<Vec<f64>> = like.iter().map(constants).collect();
-    let mut slots = (0..rows[0].len()).map(|c| {
-        let same = rows.iter().all(|row| row[c].to_bits() == rows[0][c].to_bits());
-        if same {
-            return Slot::Const(rows[0][c]);
-        }
-        let column = table[0].len();
-        for (row, from) in table.iter_mut().zip(&rows) {
-            row.push(from[c]);
-        }
-        Slot::Column(column)
-    });
+    let mut slots = slots_of(&like.iter().map(constants).collect::<Vec<_>>(), table).into_iter();
     map_node(&like[0], &mut |_| slots.next().unwrap_or(Slot::Const(0.0)))
 }
 
-/// A node with every constant replaced, always in the same order.
-pub(super) fn map_node<A: Copy, B>(node: &Node<A>, f: &mut impl FnMut(A) -> B) -> Node<B> {
-    let place = node.place.iter().map(|step| match *step {
+/// Constants of the turns, one list for each: those that differ get a column of the table.
+pub(super) fn slots_of(turns: &[Vec<f64>], table: &mut [Vec<f64>]) -> Vec<Slot> {
+    let slot = |c: usize| {
+        let same = turns.iter().all(|turn| turn[c].to_bits() == turns[0][c].to_bits());
+        if same {
+            return Slot::Const(turns[0][c]);
+        }
+        let column = table[0].len();
+        for (row, from) in table.iter_mut().zip(turns) {
+            row.push(from[c]);
+        }
+        Slot::Column(column)
+    };
+    (0..turns[0].len()).map(slot).collect()
+}
+
+fn map_steps<A: Copy, B>(steps: &[ElementaryTransform<A>], f: &mut impl FnMut(A) -> B) -> Vec<ElementaryTransform<B>> {
+    let steps = steps.iter().map(|step| match *step {
         ElementaryTransform::Turn { axis, c, s } => ElementaryTransform::Turn { axis, c: f(c), s: f(s) },
         ElementaryTransform::Shift { axis, r } => ElementaryTransform::Shift { axis, r: f(r) },
         ElementaryTransform::Rotate(m) => ElementaryTransform::Rotate(m.map(|row| row.map(&mut *f))),
     });
-    let place = place.collect();
+    steps.collect()
+}
+
+/// A constraint with every constant replaced, always in the same order.
+pub(super) fn map_constraint<A: Copy, B>(constraint: &Constraint<A>, f: &mut impl FnMut(A) -> B) -> Constraint<B> {
+    let bond = match &constraint.bond {
+        Bond::Cut(cut) => {
+            let closure = cut.closure.map(&mut *f);
+            let [a, b] =
+                [&cut.a, &cut.b].map(|frame| TreeFrame { node: frame.node, place: map_steps(&frame.place, f) });
+            let (path_a, path_b) = (cut.path_a.clone(), cut.path_b.clone());
+            Bond::Cut(Cut { closure, a, b, path_a, path_b, grounded: cut.grounded })
+        }
+        Bond::Coupling { terms, offset } => {
+            Bond::Coupling { terms: terms.iter().map(|(node, ratio)| (*node, f(*ratio))).collect(), offset: f(*offset) }
+        }
+    };
+    Constraint {
+        bond,
+        slots: constraint.slots.clone(),
+        passes: constraint.passes.clone(),
+        first: constraint.first,
+        entry: constraint.entry,
+        velocities: constraint.velocities.clone(),
+        decay: constraint.decay.map(&mut *f),
+        compliance: constraint.compliance.map(&mut *f),
+        own_axes: constraint.own_axes,
+    }
+}
+
+/// A node with every constant replaced, always in the same order.
+pub(super) fn map_node<A: Copy, B>(node: &Node<A>, f: &mut impl FnMut(A) -> B) -> Node<B> {
+    let place = map_steps(&node.place, f);
     let passive = node.passive.iter().map(|p| mbd_runtime::tree::Passive {
         damping: f(p.damping),
         stiffness: f(p.stiffness),

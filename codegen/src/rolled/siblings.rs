@@ -1,42 +1,51 @@
-//! Like branches of one node: legs, arms, fingers.
+//! Like branches of one node: legs, arms, fingers; and like mechanisms side by side on the ground.
 //!
-//! Branches are alike if their nodes have the same kinds of joints and the same elimination. Constants may differ in
-//! everything, their zeros and signs included: what is not the same in all branches becomes a column of the table. Steps
-//! that only some of the placements have are let in elsewhere as identities.
+//! Branches are alike if their nodes have the same kinds of joints and the same elimination, and the loops inside of them are
+//! of the same kinds. Constants may differ in everything, their zeros and signs included: what is not the same in all branches
+//! becomes a column of the table. Steps that only some of the placements have are let in elsewhere as identities.
+
+use std::ops::Range;
 
 use mbd_runtime::spatial::ElementaryTransform;
-use mbd_runtime::tree::{Elimination, Node, Source, Tree, Unknown};
+use mbd_runtime::tree::{Bond, Constraint, Elimination, Node, Source, Tree, Unknown};
 
-use super::runs::{columns_of, map_node, same_joint, same_step, Branches, Run};
+use super::runs::{columns_of, map_constraint, map_node, same_joint, same_step, slots_of, Branches, Extent, Run, Slot};
 use crate::symbolic::Expr;
 
 /// Largest number of branches in a set: the lanes of a vector register.
 pub const WIDTH: usize = 4;
 
-/// A branch by itself: nodes, coordinates and unknowns are numbered from its first ones.
+/// A branch by itself: nodes, coordinates, unknowns, rows and entries of `Φ` are numbered from its first ones.
 struct Branch {
     root: usize,
     nodes: Vec<Node<f64>>,
+    constraints: Vec<Constraint<f64>>,
     unknowns: Vec<Unknown>,
-    first: (usize, usize),
-    size: (usize, usize),
+    solve_at_ground: Vec<usize>,
+    first: Extent,
+    size: Extent,
 }
 
 /// Sets of like branches, each of nodes that are in no other set, inner nodes first. With `turns`, placements may be
 /// made alike by turns about no angle, which round in other places than the sweeps.
 pub fn find(tree: &Tree<Expr>, turns: bool) -> Vec<Run> {
-    if !tree.wrenches.is_empty() || !tree.constraints.is_empty() {
+    if !tree.wrenches.is_empty() || tree.row_factors.is_some() {
         return Vec::new();
     }
     let n = tree.nodes.len();
     let mut taken = vec![false; n];
     let mut sets = Vec::new();
-    for parent in (0..n).filter(|&p| !tree.nodes[p].elimination.non_rotating) {
-        if taken[parent] {
+    let mut branches = vec![Vec::new(); n + 1];
+    // Those of the ground come first.
+    let place = |parent: Option<usize>| parent.map_or(0, |p| p + 1);
+    (0..n).for_each(|root| branches[place(tree.nodes[root].parent)].push(root..end_of(tree, root)));
+    join(tree, &mut branches[0]);
+    for (parent, nodes) in std::iter::once(None).chain((0..n).map(Some)).zip(branches) {
+        let unfit = |p: usize| taken[p] || tree.nodes[p].elimination.non_rotating;
+        if nodes.len() < 2 || parent.is_some_and(unfit) {
             continue;
         }
-        let roots = (parent + 1..n).filter(|&i| tree.nodes[i].parent == Some(parent));
-        let mut rest: Vec<Branch> = roots.filter_map(|root| Branch::new(tree, root)).collect();
+        let mut rest: Vec<Branch> = nodes.into_iter().filter_map(|nodes| Branch::new(tree, parent, nodes)).collect();
         while !rest.is_empty() {
             let first = rest.remove(0);
             let (mut like, mut other) = (vec![first], Vec::new());
@@ -48,7 +57,7 @@ pub fn find(tree: &Tree<Expr>, turns: bool) -> Vec<Run> {
             }
             rest = other;
             for like in like.chunks(WIDTH) {
-                let Some(run) = run(&tree.nodes[parent].elimination, parent, like, turns) else { continue };
+                let Some(run) = run(tree, parent, like, turns) else { continue };
                 for branch in like {
                     taken[branch.root..branch.root + branch.nodes.len()].fill(true);
                 }
@@ -59,16 +68,45 @@ pub fn find(tree: &Tree<Expr>, turns: bool) -> Vec<Run> {
     sets
 }
 
+/// The node after the last of those that follow `root` and descend from it.
+fn end_of(tree: &Tree<Expr>, root: usize) -> usize {
+    let inside = |i: usize| tree.nodes[i].parent.is_some_and(|p| p >= root);
+    (root + 1..tree.nodes.len()).find(|&i| !inside(i)).unwrap_or(tree.nodes.len())
+}
+
+/// Joins branches of the ground that constraints bind to one another, with those between them.
+fn join(tree: &Tree<Expr>, branches: &mut Vec<Range<usize>>) {
+    for constraint in &tree.constraints {
+        let of = |i: usize| branches.iter().position(|nodes| nodes.contains(&i));
+        let all: Vec<usize> = nodes_of(&constraint.bond).into_iter().flatten().filter_map(of).collect();
+        let (Some(&first), Some(&last)) = (all.iter().min(), all.iter().max()) else { continue };
+        let joined = branches[first].start..branches[last].end;
+        branches.splice(first..=last, [joined]);
+    }
+}
+
+/// The nodes that a constraint acts on; `None` for the ground.
+fn nodes_of<S>(bond: &Bond<S>) -> Vec<Option<usize>> {
+    match bond {
+        Bond::Cut(cut) => vec![cut.a.node, cut.b.node],
+        Bond::Coupling { terms, .. } => terms.iter().map(|(node, _)| Some(*node)).collect(),
+    }
+}
+
 impl Branch {
-    /// The branch that starts at a node, if it can be evaluated by itself.
-    fn new(tree: &Tree<Expr>, root: usize) -> Option<Branch> {
-        let inside = |i: usize| tree.nodes[i].parent.is_some_and(|p| p >= root);
-        let end = (root + 1..tree.nodes.len()).find(|&i| !inside(i)).unwrap_or(tree.nodes.len());
+    /// The branch of some nodes, if it can be evaluated by itself.
+    fn new(tree: &Tree<Expr>, parent: Option<usize>, range: Range<usize>) -> Option<Branch> {
+        let inside = |i: usize| range.contains(&i);
         // Descendants follow their ancestors without a gap.
-        if (end..tree.nodes.len()).any(|i| tree.nodes[i].parent.is_some_and(|p| (root..end).contains(&p))) {
+        let alone = (0..tree.nodes.len()).all(|i| match tree.nodes[i].parent {
+            Some(p) if inside(p) => inside(i),
+            other => !inside(i) || other == parent,
+        });
+        if !alone {
             return None;
         }
-        let states: Vec<[usize; 4]> = (root..end)
+        let states: Vec<[usize; 4]> = range
+            .clone()
             .map(|i| match tree.nodes[i].source {
                 Source::State { q, v } => Some([q, v, q + tree.nodes[i].kind.nq(), v + tree.nodes[i].kind.nv()]),
                 Source::Drive { .. } => None,
@@ -76,28 +114,56 @@ impl Branch {
             .collect::<Option<_>>()?;
         let least = |k: usize| states.iter().map(|s| s[k]).min().unwrap_or(0);
         let most = |k: usize| states.iter().map(|s| s[k]).max().unwrap_or(0);
-        let first = (least(0), least(1));
-        let size = (most(2) - first.0, most(3) - first.1);
-        let own = |v: usize| (first.1..first.1 + size.1).contains(&v);
+        let (q, v) = (least(0)..most(2), least(1)..most(3));
         // Coordinates of the branch are those of no other node.
-        let elsewhere = (0..tree.nodes.len())
-            .filter(|i| !(root..end).contains(i))
-            .any(|i| matches!(tree.nodes[i].source, Source::State { v, .. } if own(v) && tree.nodes[i].kind.nv() > 0));
-        if elsewhere || !tree.nodes[root].elimination.open.is_empty() {
+        let elsewhere = (0..tree.nodes.len()).filter(|i| !inside(*i)).any(|i| {
+            matches!(tree.nodes[i].source, Source::State { v: at, .. } if v.contains(&at) && tree.nodes[i].kind.nv() > 0)
+        });
+        if elsewhere {
             return None;
         }
-        let numbers: Vec<usize> =
-            (0..tree.unknowns.len()).filter(|&g| tree.unknowns[g].velocity().is_some_and(own)).collect();
-        if tree.solve_at_ground.iter().any(|g| numbers.contains(g)) {
+        let binds = |c: &&Constraint<Expr>| nodes_of(&c.bond).into_iter().flatten().any(inside);
+        let own: Vec<&Constraint<Expr>> = tree.constraints.iter().filter(binds).collect();
+        let rows_of = |c: &Constraint<Expr>| c.first..c.first + c.slots.len();
+        let within = |end: Option<usize>| end.map_or(parent.is_none(), inside);
+        let whole = own.iter().all(|c| nodes_of(&c.bond).into_iter().all(within))
+            && own.windows(2).all(|pair| rows_of(pair[0]).end == pair[1].first);
+        if !whole {
             return None;
         }
-        let mut nodes = Vec::new();
-        for i in root..end {
-            nodes.push(local(tree, i, root, first, &numbers)?);
+        let rows = own.first().map_or(0, |c| c.first)..own.last().map_or(0, |c| rows_of(c).end);
+        let mine = |g: usize| match tree.unknowns[g] {
+            Unknown::Velocity(at) => v.contains(&at),
+            Unknown::Row(row) => rows.contains(&row),
+        };
+        let global: Vec<usize> = (0..tree.unknowns.len()).filter(|&g| mine(g)).collect();
+        let unknown = |g: &usize| match tree.unknowns[*g] {
+            Unknown::Velocity(at) => Unknown::Velocity(at - v.start),
+            Unknown::Row(row) => Unknown::Row(row - rows.start),
+        };
+        let unknowns = global.iter().map(unknown).collect();
+        let numbers = Numbers {
+            root: range.start,
+            // Node 0 stands for the parent, where it is a node.
+            offset: usize::from(parent.is_some()),
+            first: Extent { q: q.start, v: v.start, rows: rows.start },
+            first_entry: own.first().map_or(0, |c| c.entry),
+            unknowns: &global,
+        };
+        let at_ground: Vec<usize> = tree.solve_at_ground.iter().copied().filter(|&g| mine(g)).collect();
+        let open = tree.nodes[range.start].elimination.open.len();
+        if parent.is_some() && (open > 0 || !at_ground.is_empty()) {
+            return None;
         }
-        let unknown = |g: &usize| tree.unknowns[*g].velocity().map(|v| Unknown::Velocity(v - first.1));
-        let unknowns = numbers.iter().map(unknown).collect::<Option<_>>()?;
-        Some(Branch { root, nodes, unknowns, first, size })
+        Some(Branch {
+            root: range.start,
+            nodes: range.map(|i| numbers.node(&tree.nodes[i], parent)).collect::<Option<_>>()?,
+            constraints: own.into_iter().map(|c| numbers.constraint(c)).collect::<Option<_>>()?,
+            unknowns,
+            solve_at_ground: numbers.list(&at_ground)?,
+            first: numbers.first,
+            size: Extent { q: q.len(), v: v.len(), rows: rows.len() },
+        })
     }
 
     /// The same structure, placements apart.
@@ -107,51 +173,136 @@ impl Branch {
         };
         self.nodes.len() == other.nodes.len()
             && self.unknowns == other.unknowns
+            && self.solve_at_ground == other.solve_at_ground
             && self.size == other.size
             && self.nodes.iter().zip(&other.nodes).all(same)
+            && self.constraints.iter().map(form).eq(other.constraints.iter().map(form))
+    }
+
+    /// The steps of its placements: those of the nodes, then those of the frames of the constraints.
+    fn places(&self) -> impl Iterator<Item = &Steps> {
+        let frames = self.constraints.iter().filter_map(|c| match &c.bond {
+            Bond::Cut(cut) => Some([&cut.a.place, &cut.b.place]),
+            Bond::Coupling { .. } => None,
+        });
+        self.nodes.iter().map(|node| &node.place).chain(frames.flatten())
+    }
+
+    /// Its nodes and constraints, with placements that have given steps.
+    fn with_steps(&self, steps: &[Steps], turns: bool) -> Option<(Vec<Node<f64>>, Vec<Constraint<f64>>)> {
+        let (mut nodes, mut constraints) = (self.nodes.clone(), self.constraints.clone());
+        let frames = constraints.iter_mut().filter_map(|c| match &mut c.bond {
+            Bond::Cut(cut) => Some([&mut cut.a.place, &mut cut.b.place]),
+            Bond::Coupling { .. } => None,
+        });
+        let places = nodes.iter_mut().map(|node| &mut node.place).chain(frames.flatten());
+        for (place, steps) in places.zip(steps) {
+            *place = padded(place, steps, turns)?;
+        }
+        Some((nodes, constraints))
     }
 }
 
-/// Node `i` with the numbers of its branch; `None` where it has constants that are not numbers, or columns of others.
-fn local(tree: &Tree<Expr>, i: usize, root: usize, first: (usize, usize), unknowns: &[usize]) -> Option<Node<f64>> {
-    let mut constant = true;
-    let mut node = map_node(&tree.nodes[i], &mut |x| match x {
+/// A constraint without its numbers and placements.
+fn form(constraint: &Constraint<f64>) -> Constraint<f64> {
+    let mut form = map_constraint(constraint, &mut |_| 0.0);
+    if let Bond::Cut(cut) = &mut form.bond {
+        cut.a.place.clear();
+        cut.b.place.clear();
+    }
+    form
+}
+
+/// The numbers of a branch.
+struct Numbers<'a> {
+    /// First node.
+    root: usize,
+    /// Number that it gets.
+    offset: usize,
+    first: Extent,
+    first_entry: usize,
+    /// The unknowns of the branch.
+    unknowns: &'a [usize],
+}
+
+impl Numbers<'_> {
+    fn of_node(&self, i: usize) -> usize {
+        i - self.root + self.offset
+    }
+
+    fn unknown(&self, g: usize) -> Option<usize> {
+        self.unknowns.binary_search(&g).ok()
+    }
+
+    fn list(&self, list: &[usize]) -> Option<Vec<usize>> {
+        list.iter().map(|g| self.unknown(*g)).collect()
+    }
+
+    /// A node with the numbers of its branch; `None` where it has constants that are not numbers, or columns of others.
+    fn node(&self, node: &Node<Expr>, parent: Option<usize>) -> Option<Node<f64>> {
+        let mut constant = true;
+        let mut node = map_node(node, &mut number(&mut constant));
+        if !constant {
+            return None;
+        }
+        node.parent = if node.parent == parent { parent.map(|_| 0) } else { node.parent.map(|p| self.of_node(p)) };
+        if let Source::State { q, v } = &mut node.source {
+            (*q, *v) = (*q - self.first.q, *v - self.first.v);
+        }
+        let Elimination { unknown, ends, screws, open, solve_before, solve_after, .. } = &node.elimination;
+        node.elimination = Elimination {
+            unknown: unknown.map(|g| self.unknown(g).ok_or(())).transpose().ok()?,
+            ends: self.list(ends)?,
+            screws: self.list(screws)?,
+            open: self.list(open)?,
+            solve_before: self.list(solve_before)?,
+            solve_after: self.list(solve_after)?,
+            ..node.elimination
+        };
+        Some(node)
+    }
+
+    /// The same for a constraint between nodes of the branch.
+    fn constraint(&self, constraint: &Constraint<Expr>) -> Option<Constraint<f64>> {
+        let mut constant = true;
+        let mut out = map_constraint(constraint, &mut number(&mut constant));
+        if !constant {
+            return None;
+        }
+        let local = |i: &mut usize| *i = self.of_node(*i);
+        match &mut out.bond {
+            Bond::Cut(cut) => {
+                [&mut cut.a, &mut cut.b].into_iter().filter_map(|frame| frame.node.as_mut()).for_each(local);
+                cut.path_a.iter_mut().chain(&mut cut.path_b).for_each(local);
+            }
+            Bond::Coupling { terms, .. } => terms.iter_mut().map(|(i, _)| i).for_each(local),
+        }
+        out.slots = self.list(&out.slots)?;
+        out.passes = out.passes.iter().map(|slots| self.list(slots)).collect::<Option<_>>()?;
+        (out.first, out.entry) = (out.first - self.first.rows, out.entry.checked_sub(self.first_entry)?);
+        out.velocities.iter_mut().for_each(|v| *v -= self.first.v);
+        Some(out)
+    }
+}
+
+/// Takes constants as numbers, and tells whether there is one that is none.
+fn number(constant: &mut bool) -> impl FnMut(Expr) -> f64 + '_ {
+    |x| match x {
         Expr::Const(x) => x,
         Expr::Node { .. } => {
-            constant = false;
+            *constant = false;
             0.0
         }
-    });
-    if !constant {
-        return None;
     }
-    // Node 0 stands for the parent of the branch.
-    node.parent = Some(if i == root { 0 } else { node.parent? - root + 1 });
-    if let Source::State { q, v } = &mut node.source {
-        (*q, *v) = (*q - first.0, *v - first.1);
-    }
-    let number = |g: usize| unknowns.iter().position(|h| *h == g);
-    let numbers = |list: &[usize]| list.iter().map(|g| number(*g)).collect::<Option<Vec<usize>>>();
-    let Elimination { unknown, ends, screws, open, solve_before, solve_after, .. } = &node.elimination;
-    node.elimination = Elimination {
-        unknown: unknown.map(|g| number(g).ok_or(())).transpose().ok()?,
-        ends: numbers(ends)?,
-        screws: numbers(screws)?,
-        open: numbers(open)?,
-        solve_before: numbers(solve_before)?,
-        solve_after: numbers(solve_after)?,
-        ..node.elimination
-    };
-    Some(node)
 }
 
 type Steps = Vec<ElementaryTransform<f64>>;
 
-/// The steps of all branches, node by node: the shortest lists that contain those of every branch in order.
+/// The steps of all branches, placement by placement: the shortest lists that contain those of every branch in order.
 fn union_of<'a>(mut branches: impl Iterator<Item = &'a Branch>, turns: bool) -> Option<Vec<Steps>> {
-    let first = branches.next()?.nodes.iter().map(|node| node.place.clone()).collect();
+    let first = branches.next()?.places().cloned().collect();
     branches.try_fold(first, |all: Vec<Steps>, branch| {
-        all.iter().zip(&branch.nodes).map(|(steps, node)| union(steps, &node.place, turns)).collect()
+        all.iter().zip(branch.places()).map(|(steps, place)| union(steps, place, turns)).collect()
     })
 }
 
@@ -189,34 +340,38 @@ fn padded(place: &[ElementaryTransform<f64>], steps: &[ElementaryTransform<f64>]
 }
 
 /// The set of some like branches; `None` where there is only one, or their coordinates do not move on steadily.
-fn run(parent: &Elimination, at: usize, like: &[Branch], turns: bool) -> Option<Run> {
+fn run(tree: &Tree<Expr>, parent: Option<usize>, like: &[Branch], turns: bool) -> Option<Run> {
     let (first, second) = (like.first()?, like.get(1)?);
-    let stride = (second.first.0.checked_sub(first.first.0)?, second.first.1.checked_sub(first.first.1)?);
-    let steady = like.windows(2).all(|pair| {
-        let ([a, b], [q, v]) = ([pair[0].first, pair[1].first], [stride.0, stride.1]);
-        (a.0 + q, a.1 + v) == b
-    });
-    if !steady {
+    let stride = second.first.checked_sub(first.first)?;
+    if !like.windows(2).all(|pair| pair[1].first.checked_sub(pair[0].first) == Some(stride)) {
         return None;
     }
     let steps = union_of(like.iter(), turns)?;
+    let all: Vec<(Vec<Node<f64>>, Vec<Constraint<f64>>)> =
+        like.iter().map(|branch| branch.with_steps(&steps, turns)).collect::<Option<_>>()?;
     let mut table = vec![Vec::new(); like.len()];
-    let mut template = Vec::new();
-    for (k, steps) in steps.iter().enumerate() {
-        let node = |branch: &Branch| {
-            let node = branch.nodes[k].clone();
-            Some(Node { place: padded(&node.place, steps, turns)?, ..node })
+    let node = |k: usize| all.iter().map(|(nodes, _)| nodes[k].clone()).collect::<Vec<_>>();
+    let template = (0..first.nodes.len()).map(|k| columns_of(&node(k), &mut table)).collect();
+    let mut constraints = Vec::new();
+    for k in 0..first.constraints.len() {
+        let numbers = |(_, constraints): &(_, Vec<Constraint<f64>>)| {
+            let mut numbers = Vec::new();
+            map_constraint(&constraints[k], &mut |x| numbers.push(x));
+            numbers
         };
-        template.push(columns_of(&like.iter().map(node).collect::<Option<Vec<_>>>()?, &mut table));
+        let mut slots = slots_of(&all.iter().map(numbers).collect::<Vec<_>>(), &mut table).into_iter();
+        constraints.push(map_constraint(&all[0].1[k], &mut |_| slots.next().unwrap_or(Slot::Const(0.0))));
     }
     let branches = Branches {
-        parent: at,
+        parent,
         roots: like.iter().map(|branch| branch.root).collect(),
         stride,
+        first: first.first,
         size: first.size,
         unknowns: first.unknowns.clone(),
-        accumulates: parent.accumulates_momentum,
+        solve_at_ground: first.solve_at_ground.clone(),
+        accumulates: parent.is_some_and(|p| tree.nodes[p].elimination.accumulates_momentum),
     };
     let nodes = first.root..first.root + first.nodes.len();
-    Some(Run { period: nodes.len(), nodes, template, table, branches: Some(branches) })
+    Some(Run { period: nodes.len(), nodes, template, constraints, table, branches: Some(branches) })
 }

@@ -1,4 +1,4 @@
-//! Like branches of one node computed at the same time, one in each lane of a vector register, for one state.
+//! Like branches of one node, or of the ground, computed at the same time, one in each lane of a vector register, for one state.
 
 use super::{build, siblings, RolledProgram, WIDTH};
 use crate::options::{Arithmetic, LikeBranches, Options};
@@ -19,7 +19,7 @@ pub struct Together {
 /// Like branches together in an output; `None` where there are none.
 pub fn together(plan: &Plan, group: Output, options: &Options) -> Option<OutputProgram<Together>> {
     // Where the open modes of contacts leave no row, branches are as alike as without contacts.
-    if matches!(plan.acts, RowsThatAct::Input) || !plan.constraints.is_empty() {
+    if !matches!(plan.acts, RowsThatAct::All) && !plan.constraints.is_empty() {
         return None;
     }
     if options.plan.branches == LikeBranches::Apart {

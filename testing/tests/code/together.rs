@@ -13,7 +13,7 @@ use mbd_codegen::plan::Plan;
 use mbd_codegen::read::Base;
 use mbd_codegen::rolled::{together, Vectors};
 use mbd_codegen::{search, Arithmetic, Options, Output, Precision};
-use mbd_testing::branches::{tree, NUMBERS};
+use mbd_testing::branches::{tree, with_loops, On, NUMBERS};
 use mbd_testing::state::{random_state, State};
 use mbd_testing::{assert_same_bits, relative_error};
 
@@ -29,41 +29,20 @@ fn options(arithmetic: Arithmetic, elimination: EliminationStrategy) -> Options 
 /// sets of the rates.
 fn compare(what: &str, model: &Model, plan: &Plan, options: &Options) -> usize {
     let s = random_state(plan, 7);
-    let (nq, nv) = (plan.dims.nq, plan.dims.nv);
+    let nv = plan.dims.nv;
     let mut i = s.interpreter(plan);
-    let (mut p, mut v, mut qd, mut pd, mut a) =
-        (vec![0.0; nv], vec![0.0; nv], vec![0.0; nq], vec![0.0; nv], vec![0.0; nv]);
+    let (mut p, mut a) = (vec![0.0; nv], vec![0.0; nv]);
     i.momenta(&s.q, &s.v, &mut p);
     i.accelerations(&s.q, &s.v, &mut a);
     let mut branches = 0;
-    for output in Output::available(false) {
+    for output in Output::available(!plan.constraints.is_empty()) {
         let Some(both) = together(plan, output, options) else { continue };
-        let expected = match output {
-            Output::Rates => {
-                i.rates(&s.q, &p, &mut v, &mut qd, &mut pd);
-                branches = both.program.program.loops.iter().map(|l| l.branches.len()).sum();
-                [qd.as_slice(), &pd].concat()
-            }
-            Output::Velocities => s.v.clone(),
-            Output::Momenta => p.clone(),
-            Output::Accelerations => a.clone(),
-            Output::InverseDynamics => {
-                i.inverse_dynamics(&s.q, &s.v, &a, &mut v);
-                v.clone()
-            }
-            Output::Bias => {
-                i.bias(&s.q, &s.v, &mut v);
-                v.clone()
-            }
-            other => panic!("{what}: {other:?} adds up over all nodes in order"),
-        };
-        let expected = if output == Output::Velocities {
-            i.velocities(&s.q, &p, &mut v);
-            v.clone()
-        } else {
-            expected
-        };
+        assert_ne!(output, Output::Energy, "{what}: energies add up over all nodes in order");
         let given = s.inputs_of(&both.inputs, &p, &a);
+        let expected = evaluated::<f64>(plan, options, &s, (output, true), &both.inputs, &given);
+        if output == Output::Rates {
+            branches = both.program.program.loops.iter().map(|l| l.branches.len()).sum();
+        }
         for fused in [|a: f64, b: f64, c: f64| a * b + c, |a: f64, b: f64, c: f64| a.mul_add(b, c)] {
             let results = both.program.program.evaluate(&given, fused);
             let apart = both.program.apart.evaluate(&given, fused);
@@ -75,8 +54,8 @@ fn compare(what: &str, model: &Model, plan: &Plan, options: &Options) -> usize {
             let off = relative_error(&results, &expected, 1.0);
             assert!(off <= 1e-11, "{what}: {output:?} is {off:e} off");
         }
-        let doubles = by_machine_code::<f64>(plan, options, &s, output, &both.inputs, &given);
-        let singles = by_machine_code::<f32>(plan, options, &s, output, &both.inputs, &given);
+        let doubles = evaluated::<f64>(plan, options, &s, (output, false), &both.inputs, &given);
+        let singles = evaluated::<f32>(plan, options, &s, (output, false), &both.inputs, &given);
         match options.arithmetic {
             Arithmetic::Exact => {
                 assert_same_bits(what, &format!("{output:?}, machine code"), model, &doubles, &expected);
@@ -103,16 +82,19 @@ fn compare(what: &str, model: &Model, plan: &Plan, options: &Options) -> usize {
     branches
 }
 
-/// An output by machine code; `given` are the entries of its inputs.
-fn by_machine_code<S: Number>(
+/// An output by machine code, or by the interpreter; `given` are the entries of its inputs.
+fn evaluated<S: Number>(
     plan: &Plan,
     options: &Options,
     s: &State,
-    output: Output,
+    (output, interpreted): (Output, bool),
     inputs: &[InputArray],
     mut given: &[f64],
 ) -> Vec<f64> {
     let mut machine = machine_code::compiled::<S>(plan, options, s);
+    if interpreted {
+        machine = machine.interpreted();
+    }
     let arrays = inputs.iter().map(|array| (array, given.split_off(..array.len()).expect("as many entries")));
     let arguments = arrays.filter(|(array, _)| !array.field);
     let arguments: Vec<Vec<S>> = arguments.map(|(_, array)| array.iter().map(|x| S::constant(*x)).collect()).collect();
@@ -120,7 +102,10 @@ fn by_machine_code<S: Number>(
     let lengths = output.spec().results.iter().map(|array| array.len(machine.sizes()));
     let mut found: Vec<Vec<S>> = lengths.map(|len| vec![S::constant(f64::NAN); len]).collect();
     let mut results: Vec<&mut [S]> = found.iter_mut().map(Vec::as_mut_slice).collect();
-    machine.evaluate(output, &arguments, &mut results).expect("machine code");
+    match interpreted {
+        true => machine.evaluate_or_interpret(output, &arguments, &mut results).expect("an output"),
+        false => machine.evaluate(output, &arguments, &mut results).expect("machine code"),
+    }
     found.concat().into_iter().map(|x| x.to_f64()).collect()
 }
 
@@ -156,6 +141,23 @@ fn random_trees() {
 fn more_random_trees() {
     let branches = compare_trees(15..75);
     assert!(branches > 200, "only {branches} branches are computed together");
+}
+
+/// Branches with loops inside of them, on a floating body and on the ground.
+#[test]
+fn loops_in_branches() {
+    let mut branches = [0; 2];
+    for seed in 0..16 {
+        let (numbers, on) = (NUMBERS[seed as usize % 4], if seed % 8 < 4 { On::Trunk } else { On::Ground });
+        let model = with_loops(seed, numbers, on);
+        for arithmetic in [Arithmetic::Exact, Arithmetic::Fast] {
+            let options = options(arithmetic, EliminationStrategy::Single);
+            let plan = search::plan(&model, options.plan);
+            let what = format!("seed {seed}, {numbers:?}, {on:?}, {arithmetic:?}");
+            branches[usize::from(on == On::Ground)] += compare(&what, &model, &plan, &options);
+        }
+    }
+    assert!(branches.iter().all(|n| *n > 30), "only {branches:?} branches are computed together");
 }
 
 #[test]

@@ -160,21 +160,24 @@ impl<'a> Lowering<'a> {
             }
             // angles[0][l] = q_1;
             [Word(array), Square(k), Square(lane), Word("="), value @ ..] => self.set(self.item(array, k, lane), value),
+            // rows[9] = sines[0];
+            [Word(array), Square(k), Word("="), Word(from), Square(j)] if !matches!(k[..], [Word("l")]) => {
+                let lane = [Word("l")];
+                let number = self.item(from, j, &lane);
+                let Number::Item(array, k) = self.item(array, k, &lane) else { unreachable!("an item") };
+                Step::Set(array, k, Expression::One(Operand { negative: false, number }))
+            }
             // result_0[l] = v_1;
             [Word(array), Square(lane), Word("="), value @ ..] => self.set(self.only_item(array, lane), value),
-            // qd.give(0, &result_4);
+            // qd.give(0, &result_4); or qd.give(0, &rows[4]);
             [Word(to), Word("."), Word("give"), Round(result)] => {
-                let [Word(at), Word(","), Word("&"), Word(from)] = result[..] else {
-                    panic!("unexpected result {result:?}")
-                };
+                let [Word(at), Word(","), from @ ..] = &result[..] else { panic!("unexpected result {result:?}") };
                 self.give(to, index(at), from)
             }
-            // qd.give_pair(0, [&result_4, &result_5]);
+            // qd.give_pair(0, [&result_4, &result_5]); or with rows
             [Word(to), Word("."), Word("give_pair"), Round(result)] => {
                 let [Word(at), Word(","), Square(pair)] = &result[..] else { panic!("unexpected results {result:?}") };
-                let [Word("&"), Word(one), Word(","), Word("&"), Word(two)] = pair[..] else {
-                    panic!("unexpected pair {pair:?}")
-                };
+                let [one, two] = list(pair)[..] else { panic!("unexpected pair {pair:?}") };
                 let first = self.give(to, index(at), one);
                 self.function.steps.push(first);
                 self.give(to, index(at) + 1, two)
@@ -191,14 +194,22 @@ impl<'a> Lowering<'a> {
         Step::Set(array, k, self.expression(value))
     }
 
-    /// A result is written: number `at` of the array `to`, from the array `from`.
-    fn give(&mut self, to: &'a str, at: usize, from: &'a str) -> Step {
+    /// A result is written: number `at` of the array `to`, from an array of one row or a row of another.
+    fn give(&mut self, to: &'a str, at: usize, from: &[Tree<'a>]) -> Step {
+        let (from, k) = match from {
+            [Word("&"), Word(from)] => (*from, 0),
+            [Word("&"), Word(from), Square(k)] => match k[..] {
+                [Word(k)] => (*from, index(k)),
+                _ => panic!("unexpected row {k:?}"),
+            },
+            other => panic!("unexpected result {other:?}"),
+        };
         let [to, from] = [to, from].map(|name| self.known(name));
         assert!(self.function.arrays[to].1 == Role::Written, "{:?} is not written", self.function.arrays[to].0);
         let given = self.given.entry(to).or_default();
         assert_eq!(at, *given, "results are written in order");
         *given += 1;
-        Step::Give(to, from, self.within(from, 0))
+        Step::Give(to, from, self.within(from, k))
     }
 
     fn all_sines(&mut self, names: [&'a str; 2], types: &[Tree<'a>], of: &[Tree<'a>]) -> Step {
