@@ -72,8 +72,9 @@ impl SphericalPendulum {
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        for l in 0..LANES { angles[0][l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = q.get(4, l);
+            let q_4 = angles[0][l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -299,8 +300,9 @@ impl SphericalPendulum {
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        for l in 0..LANES { angles[0][l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = q.get(4, l);
+            let q_4 = angles[0][l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -396,8 +398,9 @@ impl SphericalPendulum {
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        for l in 0..LANES { angles[0][l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = q.get(4, l);
+            let q_4 = angles[0][l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -484,8 +487,9 @@ impl SphericalPendulum {
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), energy: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        for l in 0..LANES { angles[0][l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = q.get(4, l);
+            let q_4 = angles[0][l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -617,8 +621,9 @@ impl SphericalPendulum {
     #[inline(always)]
     fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        for l in 0..LANES { angles[0][l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = q.get(4, l);
+            let q_4 = angles[0][l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -837,8 +842,9 @@ impl SphericalPendulum {
     #[inline(always)]
     fn reactions_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), reactions: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        for l in 0..LANES { angles[0][l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = q.get(4, l);
+            let q_4 = angles[0][l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -1186,8 +1192,9 @@ impl SphericalPendulum {
     #[inline(always)]
     fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        for l in 0..LANES { angles[0][l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = q.get(4, l);
+            let q_4 = angles[0][l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -1276,8 +1283,9 @@ impl SphericalPendulum {
     #[inline(always)]
     fn frames_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), rotation: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), position: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), velocity: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        for l in 0..LANES { angles[0][l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = q.get(4, l);
+            let q_4 = angles[0][l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -1504,8 +1512,9 @@ impl SphericalPendulum {
     #[inline(always)]
     fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        for l in 0..LANES { angles[0][l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = q.get(4, l);
+            let q_4 = angles[0][l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -1691,8 +1700,9 @@ impl SphericalPendulum {
     #[inline(always)]
     fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        for l in 0..LANES { angles[0][l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = q.get(4, l);
+            let q_4 = angles[0][l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -1846,8 +1856,9 @@ impl SphericalPendulum {
     #[inline(always)]
     fn jacobians_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), jacobian: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        for l in 0..LANES { angles[0][l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = q.get(4, l);
+            let q_4 = angles[0][l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -2001,8 +2012,9 @@ impl SphericalPendulum {
     #[inline(always)]
     fn bias_accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), bias: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        for l in 0..LANES { angles[0][l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = q.get(4, l);
+            let q_4 = angles[0][l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }

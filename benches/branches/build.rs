@@ -5,20 +5,27 @@ use mbd_codegen::options::LikeBranches;
 use mbd_codegen::read::{self, Base, ImportOptions};
 use mbd_codegen::{generate::generate_from, search, Arithmetic, Options, Output};
 
-/// Files of `models`, how their roots are connected, and how many of them stand side by side on the ground.
-const SCENES: [(&str, &str, Base, usize); 4] = [
+/// Files of `models` (none: [`five_bar_legs`]), how their roots are connected, and how many of them stand side by side on the ground.
+const SCENES: [(&str, &str, Base, usize); 5] = [
     ("solo12", "solo12.urdf", Base::Floating, 1),
     ("g1", "g1.urdf", Base::Floating, 1),
     ("arms", "ur5.urdf", Base::Fixed, 2),
     ("four_bars", "mechanisms/fourbar.toml", Base::Fixed, 50),
+    ("five_bars", "", Base::Fixed, 1),
 ];
 
 fn main() {
     let out = std::env::var("OUT_DIR").expect("cargo sets it");
     for (name, file, base, count) in SCENES {
-        let path = format!("../../models/{file}");
-        println!("cargo:rerun-if-changed={path}");
-        let text = std::fs::read_to_string(&path).expect("the model");
+        let (path, text) = match file {
+            "" => ("five_bar_legs.toml".to_string(), five_bar_legs()),
+            file => {
+                let path = format!("../../models/{file}");
+                println!("cargo:rerun-if-changed={path}");
+                let text = std::fs::read_to_string(&path).expect("the model");
+                (path, text)
+            }
+        };
         let model = read::model(&path, &text, &ImportOptions { base, ..ImportOptions::default() });
         let model = side_by_side(&model.unwrap_or_else(|findings| panic!("{findings}")).model, count);
         let mut options = Options { outputs: vec![Output::Rates], ..Options::default() };
@@ -33,6 +40,34 @@ fn main() {
             }
         }
     }
+}
+
+/// A quadruped each of whose legs is a planar five-bar: two motors on the trunk, whose links meet in the foot.
+fn five_bar_legs() -> String {
+    let body = |name: &str, mass: f64, com: f64, size: f64| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nmass = {mass}\ncom = [{com}, 0, 0]\ninertia = [{size}, {size}, {size}]\n\n"
+        )
+    };
+    let joint = |child: &str, parent: &str, kind: &str, at: [f64; 3]| {
+        format!("[[joint]]\nname = \"j_{child}\"\ntype = \"{kind}\"\n{parent}child = \"{child}\"\nxyz = {at:?}\naxis = [0, 1, 0]\n\n")
+    };
+    let mut text = "name = \"five_bar_legs\"\ngravity = [0, 0, -9.81]\n\n".to_string() + &body("trunk", 5.0, 0.01, 0.1);
+    text += &joint("trunk", "", "floating", [0.0; 3]).replace("xyz = [0.0, 0.0, 0.0]\naxis = [0, 1, 0]\n", "");
+    for (leg, [x, y]) in [("lf", [0.2, 0.1]), ("rf", [0.2, -0.1]), ("lh", [-0.2, 0.1]), ("rh", [-0.2, -0.1])] {
+        for (side, dx) in [("front", 0.02), ("back", -0.02)] {
+            let (upper, lower) = (format!("{leg}_{side}_upper"), format!("{leg}_{side}_lower"));
+            text += &(body(&upper, 0.1, 0.05, 1e-4) + &body(&lower, 0.12, 0.1, 4e-4));
+            text += &joint(&upper, "parent = \"trunk\"\n", "revolute", [x + dx, y, 0.0]);
+            text += &joint(&lower, &format!("parent = \"{upper}\"\n"), "revolute", [0.1, 0.0, 0.0]);
+            text += &format!("[[frame]]\nname = \"{lower}_end\"\nbody = \"{lower}\"\nxyz = [0.2, 0, 0]\n\n");
+        }
+        text += &format!(
+            "[[loop]]\nname = \"{leg}_foot\"\ntype = \"revolute\"\nbetween = [\"{leg}_front_lower_end\", \
+             \"{leg}_back_lower_end\"]\naxis = [0, 1, 0]\n\n"
+        );
+    }
+    text
 }
 
 /// Several of a mechanism on the ground, all in the same place: they do not touch.

@@ -130,22 +130,6 @@ fn store_pair(to: &mut [f64; 2], x: [f64; 2]) {
     }
 }
 
-/// Columns of a batch of which a kernel writes the places from `at` on. Places after the last one are dropped.
-pub struct Columns<'a, 'c, T, const N: usize> {
-    /// One column for each number.
-    pub columns: &'a mut [&'c mut [T]; N],
-    /// Where lane 0 is written.
-    pub at: usize,
-}
-
-/// Copies as many numbers as there is room for. Apart from the copy of all of them, which would otherwise become a part of
-/// this one, of a length that is known at run time only.
-#[cold]
-#[inline(never)]
-fn give_some<T: Copy>(to: &mut [T], from: &[T]) {
-    to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
-}
-
 macro_rules! places {
     ($float:tt) => {
         places!(@one $float, [const N: usize], [$float; N]);
@@ -154,20 +138,10 @@ macro_rules! places {
         places!(@lanes $float, [const L: usize], [[$float; L]]);
         // Blocks of a batch, which lie where the caller's columns are.
         places!(@read $float, [const L: usize, const N: usize], [&[$float; L]; N]);
-        impl<const N: usize> Write<$float> for Columns<'_, '_, $float, N> {
+        impl<const L: usize, const N: usize> Write<$float> for [&mut [$float; L]; N] {
             #[inline(always)]
             fn set(&mut self, k: usize, l: usize, x: $float) {
-                if let Some(to) = self.columns[k].get_mut(self.at + l) {
-                    *to = x;
-                }
-            }
-            #[inline(always)]
-            fn give<const L: usize>(&mut self, k: usize, x: &[$float; L]) {
-                let rest = self.columns[k].get_mut(self.at..).unwrap_or_default();
-                match rest.first_chunk_mut() {
-                    Some(to) => *to = *x,
-                    None => give_some(rest, x),
-                }
+                self[k][l] = x;
             }
         }
     };

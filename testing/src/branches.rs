@@ -42,18 +42,19 @@ fn body(text: &mut String, name: &str, parent: &str, kind: &str, rng: &mut Rng, 
     );
 }
 
-/// What branches hang on.
+/// What branches hang on, and their rods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum On {
-    /// A floating body.
+    /// Branches hang on a floating body, rods on the first body of a branch.
     Trunk,
-    /// The ground.
+    /// Both hang on the ground.
     Ground,
+    /// Both hang on a floating body.
+    TrunkBoth,
 }
 
-/// Two to six like branches with loops and couplings inside of each: a chain of revolute joints, and a rod beside it, on the first
-/// body of the chain (on the ground in the other case) with its end bound to that of the chain. Those on the ground are also
-/// bound to it.
+/// Two to six like branches with loops and couplings inside of each: a chain of revolute joints, and a rod beside it
+/// with its end bound to that of the chain. Where both hang on the same body or on the ground, some are also bound to it.
 ///
 /// # Panics
 /// If the reader refuses the text.
@@ -61,7 +62,7 @@ pub fn with_loops(seed: u64, numbers: Numbers, on: On) -> Model {
     let mut rng = Rng::new(seed, 4);
     let mut text = "name = \"loops\"\ngravity = [0, 0, -9.81]\n\n".to_string();
     let parent = match on {
-        On::Trunk => {
+        On::Trunk | On::TrunkBoth => {
             text += "[[body]]\nname = \"trunk\"\nmass = 5.0\ncom = [0.1, 0, 0.02]\ninertia = [0.2, 0.3, \
                      0.4]\n\n[[joint]]\nname = \"base\"\ntype = \"floating\"\nchild = \"trunk\"\n\n";
             "trunk"
@@ -78,7 +79,7 @@ pub fn with_loops(seed: u64, numbers: Numbers, on: On) -> Model {
             body(&mut text, name, if k == 0 { parent } else { &names[k - 1] }, "revolute", &mut own, scale);
         }
         let rod = format!("rod{branch}");
-        let root = if on == On::Ground { "" } else { names[0].as_str() };
+        let root = if on == On::Trunk { names[0].as_str() } else { parent };
         body(&mut text, &rod, root, "spherical", &mut own, scale);
         let size = 0.4 + own.around(0.1);
         let number = match kind {
@@ -99,10 +100,11 @@ pub fn with_loops(seed: u64, numbers: Numbers, on: On) -> Model {
                 names[1], names[2]
             );
         }
-        if held && on == On::Ground {
+        if held && on != On::Trunk {
+            let to = if parent.is_empty() { "ground" } else { parent };
             let _ = writeln!(
                 text,
-                "[[loop]]\nname = \"held{branch}\"\ntype = \"distance\"\nbetween = [\"ground\", \"{}\"]\nlength = \
+                "[[loop]]\nname = \"held{branch}\"\ntype = \"distance\"\nbetween = [\"{to}\", \"{}\"]\nlength = \
                  {size}\n",
                 names[1]
             );

@@ -94,12 +94,11 @@ impl<'a> Straight<'a> {
             let _ = writeln!(out, "        let mut rows = {rows};");
         }
         self.write_sines(out);
-        self.write_given(out);
+        let copied = self.write_given(out);
         if !self.in_one_array() {
             self.head.locals(out, "        ", "result", self.program.outputs.len());
         }
         let _ = writeln!(out, "        for l in 0..LANES {{");
-        let copied = self.given().enumerate().map(|(k, (id, _))| (id, k)).collect();
         self.write_steps(out, &self.angles.after, &copied, true);
         self.write_results(out);
         let _ = writeln!(out, "    }}");
@@ -141,16 +140,10 @@ impl<'a> Straight<'a> {
             return;
         }
         let _ = writeln!(out, "        let mut angles = {};", self.head.rows(n));
-        let mut copied = BTreeMap::new();
-        if self.in_one_array() {
-            // Its rows are free until the inputs of the other loop are copied.
-            let read = self.given_of(&self.angles.before).take(self.locations()).collect::<Vec<_>>();
-            self.write_copies(out, read.iter().map(|(_, k)| *k));
-            copied = read.iter().enumerate().map(|(k, (id, _))| (*id, k)).collect();
-        }
+        let (set, copied) = self.write_inputs_of_angles(out);
         let _ = writeln!(out, "        for l in 0..LANES {{");
-        self.write_steps(out, &self.angles.before, &copied, false);
-        for (k, angle) in self.angles.early.keys().enumerate() {
+        self.write_steps(out, &set, &copied, false);
+        for (k, angle) in self.angles.early.keys().enumerate().filter(|(_, angle)| set.contains(angle)) {
             let _ = writeln!(out, "            angles[{k}][l] = {};", self.names[angle]);
         }
         let _ = writeln!(out, "        }}");
@@ -162,10 +155,35 @@ impl<'a> Straight<'a> {
         }
     }
 
+    /// Where some angles are more than an input, copies inputs to the rows of angles, and gives the steps that are left, with the
+    /// rows that they read: no vectors are made of a loop whose inputs may overlap with what it writes.
+    fn write_inputs_of_angles(&self, out: &mut String) -> (BTreeSet<u32>, BTreeMap<u32, String>) {
+        let inputs: BTreeMap<u32, u32> = self.given_of(&self.angles.before).collect();
+        let angles: Vec<u32> = self.angles.early.keys().copied().collect();
+        let mut set: BTreeSet<u32> = angles.iter().copied().filter(|angle| !inputs.contains_key(angle)).collect();
+        let mut free = (0..angles.len()).filter(|k| set.contains(&angles[*k])).collect::<Vec<_>>().into_iter();
+        for (id, op, _) in self.program.steps.iter().rev() {
+            if set.contains(id) {
+                set.extend(nodes(op));
+            }
+        }
+        let row = |id: &u32| angles.iter().position(|angle| angle == id).or_else(|| free.next());
+        let read: BTreeSet<u32> = inputs.keys().copied().filter(|id| set.contains(id) || angles.contains(id)).collect();
+        let rows: Option<Vec<usize>> = read.iter().map(row).collect();
+        let Some(rows) = rows.filter(|_| !set.is_empty()) else { return (self.angles.before.clone(), BTreeMap::new()) };
+        let mut copied = BTreeMap::new();
+        for (id, row) in read.into_iter().zip(rows) {
+            let from = self.head.input(inputs[&id] as usize, "", "l");
+            let _ = writeln!(out, "        for l in 0..LANES {{ angles[{row}][l] = {from}; }}");
+            copied.insert(id, format!("angles[{row}]"));
+        }
+        (set, copied)
+    }
+
     /// Those of the program's steps that are in a set, in order. Many statements are written in blocks that return the
     /// values that are needed after them: each `let` is a scope inside the one before it, and debug information of
     /// thousands of them is deeper than the compiler's stack.
-    fn write_steps(&self, out: &mut String, set: &BTreeSet<u32>, copied: &BTreeMap<u32, usize>, lanes: bool) {
+    fn write_steps(&self, out: &mut String, set: &BTreeSet<u32>, copied: &BTreeMap<u32, String>, lanes: bool) {
         let mut late = self.angles.late.clone();
         let steps = self.program.steps.iter().filter(|(id, _, _)| set.contains(id));
         let statements: Vec<Statement> = steps.filter_map(|step| self.statement(step, copied, &mut late)).collect();
@@ -213,13 +231,13 @@ impl<'a> Straight<'a> {
     fn statement(
         &self,
         (id, op, label): &(u32, Op, Label),
-        copied: &BTreeMap<u32, usize>,
+        copied: &BTreeMap<u32, String>,
         late: &mut Pairs,
     ) -> Option<Statement> {
         let (name, is_input) = (&self.names[id], matches!(op, Op::Input(_)));
         let own = |text: String, uses| Some(Statement { text, makes: vec![*id], uses, label: *label, is_input });
-        if let Some(k) = copied.get(id) {
-            return own(format!("let {name} = {}[l];", self.row("given", *k)), Vec::new());
+        if let Some(row) = copied.get(id) {
+            return own(format!("let {name} = {row}[l];"), Vec::new());
         }
         let (angle, row) = match op {
             Op::Sin(a) => (a, "sines"),
@@ -257,21 +275,18 @@ impl<'a> Straight<'a> {
         })
     }
 
-    /// Copies inputs into rows.
-    fn write_copies(&self, out: &mut String, inputs: impl Iterator<Item = u32>) {
-        for (to, k) in inputs.enumerate() {
-            let from = self.head.input(k as usize, "", "l");
-            let _ = writeln!(out, "        for l in 0..LANES {{ {}[l] = {from}; }}", self.row("given", to));
-        }
-    }
-
     /// Inputs are copied first, as results are written last: the loop over lanes then uses memory that nothing else can
     /// point to, and the compiler vectorises it without run-time checks for overlap.
-    fn write_given(&self, out: &mut String) {
+    fn write_given(&self, out: &mut String) -> BTreeMap<u32, String> {
         if !self.in_one_array() {
             self.head.locals(out, "        ", "given", self.given);
         }
-        self.write_copies(out, self.given().map(|(_, k)| k));
+        let copy = |(to, (id, k)): (usize, (u32, u32))| {
+            let (row, from) = (self.row("given", to), self.head.input(k as usize, "", "l"));
+            let _ = writeln!(out, "        for l in 0..LANES {{ {row}[l] = {from}; }}");
+            (id, row)
+        };
+        self.given().enumerate().map(copy).collect()
     }
 
     /// Results are collected in arrays before they are written to the arguments.

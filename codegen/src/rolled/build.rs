@@ -79,8 +79,9 @@ fn without_inner<'g>(mut tree: Tree<Expr<'g>>, runs: &[Run]) -> Tree<Expr<'g>> {
             let first = branches.first.rows + turn * branches.stride.rows;
             let rows = first..first + branches.size.rows;
             tree.constraints.retain(|c| !rows.contains(&c.first));
-            let unknowns = &tree.unknowns;
-            tree.solve_at_ground.retain(|&g| !matches!(unknowns[g], Unknown::Row(row) if rows.contains(&row)));
+            let outer = |g: usize| !matches!(tree.unknowns[g], Unknown::Row(row) if rows.contains(&row));
+            tree.solve_at_ground.retain(|&g| outer(g));
+            tree.nodes.iter_mut().for_each(|node| node.elimination.retain_columns(outer));
         }
     }
     tree

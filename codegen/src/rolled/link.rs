@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use mbd_runtime::spatial::RigidInertia;
 use mbd_runtime::sweep::pass::Pass;
 use mbd_runtime::tree::{
-    Bond, Closure, Constraint, Cut, Dims, Elimination, Kind, Node, Source, Tree, TreeFrame, Unknown,
+    Bond, Closure, Constraint, Cut, Dims, Elimination, Kind, Node, Passive, Source, Tree, TreeFrame, Unknown,
 };
 use mbd_runtime::Scalar;
 
@@ -55,6 +55,7 @@ pub struct Link<'g, 'a> {
     graph: &'g Graph,
     stage: PassState<'g, 'a>,
     given: SymbolicInputs<'g>,
+    /// Nodes beside the one that stands for the rest of the tree, if there is one.
     nodes: usize,
     /// What the graph's inputs are.
     pub inputs: Vec<LinkInput>,
@@ -92,6 +93,9 @@ impl<'g, 'a> Link<'g, 'a> {
             Some(branches) if branches.parent.is_none() => Vec::new(),
             branches => vec![dummy(branches.as_ref().is_some_and(|b| b.accumulates))],
         };
+        if let Some(branches) = run.branches.as_ref().filter(|b| b.parent.is_some() && !b.solve_last.is_empty()) {
+            nodes.push(solver(branches.solve_last.clone()));
+        }
         for (k, node) in run.template.iter().enumerate() {
             let mut node = map_node(node, &mut slot);
             if run.branches.is_none() {
@@ -125,11 +129,16 @@ impl<'g, 'a> Link<'g, 'a> {
         // In a chain, numbered as in the tree; coordinates are open nowhere in it.
         let row = |shared: &Unknown| if let Unknown::Row(_) = shared { *shared } else { Unknown::Row(0) };
         let (rows, shared, solve_at_ground) = match &run.branches {
-            Some(branches) => (size.rows, branches.unknowns.clone(), branches.solve_at_ground.clone()),
+            Some(branches) => {
+                let last = if branches.parent.is_none() { branches.solve_last.clone() } else { Vec::new() };
+                (size.rows, branches.unknowns.clone(), last)
+            }
             None if constraints.is_empty() => (tree.dims.rows, Vec::new(), Vec::new()),
             None => (tree.dims.rows, tree.unknowns.iter().map(row).collect(), Vec::new()),
         };
-        let dims = Dims { nq, nv, rows, ..Dims::default() };
+        let dims = Dims { nq, nv, rows, drive_q: 3, drive_v: 3, ..Dims::default() };
+        let count =
+            nodes.len() - nodes.first().map_or(0, |node| usize::from(matches!(node.source, Source::Drive { .. })));
         let tree = Tree {
             nodes,
             dims,
@@ -150,8 +159,7 @@ impl<'g, 'a> Link<'g, 'a> {
             matrix_depth: 0,
         };
         let stage = PassState::new(group, graph, tree, passes)?;
-        let nodes = run.period;
-        Some(Link { graph, stage, given, nodes, inputs, passes: Vec::new(), size, stride })
+        Some(Link { graph, stage, given, nodes: count, inputs, passes: Vec::new(), size, stride })
     }
 
     /// A pass, carrying in `first` at its first turn. What is constant there and stays so from turn to turn is a
@@ -366,6 +374,15 @@ fn stand_in<'g>(constraint: &Constraint<Expr<'_>>, run: &Run) -> Constraint<Expr
         own_axes: false,
         velocities: Vec::new(),
     }
+}
+
+/// A node without inertia and motion, at which rows are solved that bind branches of one node to one another, or to that node: it
+/// stands between them and the node.
+fn solver<'g>(rows: Vec<usize>) -> Node<Expr<'g>> {
+    let zero = Expr::zero();
+    let none = Passive { damping: zero, stiffness: zero, rest: zero, armature: zero };
+    let elimination = Elimination { solve_before: rows, ..Elimination::default() };
+    Node { parent: Some(0), passive: vec![none; 3], elimination, ..dummy(false) }
 }
 
 /// Stands for whatever is inboard of a turn: has no inertia, and is never stepped.

@@ -44,8 +44,8 @@ pub struct Branches {
     pub size: Extent,
     /// Unknowns of a branch, by its own velocities and rows.
     pub(super) unknowns: Vec<Unknown>,
-    /// Those of them that are solved at the ground.
-    pub(super) solve_at_ground: Vec<usize>,
+    /// Those of them that are solved where the branches hang: at the ground or at their parent.
+    pub(super) solve_last: Vec<usize>,
     /// Whether the momentum of the branches is accumulated at their parent.
     pub(super) accumulates: bool,
 }

@@ -21,14 +21,16 @@ struct Branch {
     nodes: Vec<Node<f64>>,
     constraints: Vec<Constraint<f64>>,
     unknowns: Vec<Unknown>,
-    solve_at_ground: Vec<usize>,
+    /// Unknowns that are solved where the branch hangs: at the ground, or at its parent.
+    solve_last: Vec<usize>,
     first: Extent,
     size: Extent,
 }
 
-/// Sets of like branches, each of nodes that are in no other set, inner nodes first. With `turns`, placements may be
-/// made alike by turns about no angle, which round in other places than the sweeps.
-pub fn find(tree: &Tree<Expr>, turns: bool) -> Vec<Run> {
+/// Sets of like branches, each of nodes that are in no other set, inner nodes first. In `fast` arithmetic, what rounds in other
+/// places than the sweeps is allowed: turns about no angle that make placements alike; and rows that are solved at the parent
+/// of a branch, which then are solved before the branches are added up.
+pub fn find(tree: &Tree<Expr>, fast: bool) -> Vec<Run> {
     if !tree.wrenches.is_empty() || tree.row_factors.is_some() {
         return Vec::new();
     }
@@ -39,25 +41,28 @@ pub fn find(tree: &Tree<Expr>, turns: bool) -> Vec<Run> {
     // Those of the ground come first.
     let place = |parent: Option<usize>| parent.map_or(0, |p| p + 1);
     (0..n).for_each(|root| branches[place(tree.nodes[root].parent)].push(root..end_of(tree, root)));
-    join(tree, &mut branches[0]);
-    for (parent, nodes) in std::iter::once(None).chain((0..n).map(Some)).zip(branches) {
+    for (parent, mut nodes) in std::iter::once(None).chain((0..n).map(Some)).zip(branches) {
+        if parent.is_none() || fast {
+            join(tree, parent, &mut nodes);
+        }
         let unfit = |p: usize| taken[p] || tree.nodes[p].elimination.non_rotating;
         if nodes.len() < 2 || parent.is_some_and(unfit) {
             continue;
         }
-        let mut rest: Vec<Branch> = nodes.into_iter().filter_map(|nodes| Branch::new(tree, parent, nodes)).collect();
+        let mut rest: Vec<Branch> =
+            nodes.into_iter().filter_map(|nodes| Branch::new(tree, parent, nodes, fast)).collect();
         while !rest.is_empty() {
             let first = rest.remove(0);
             let (mut like, mut other) = (vec![first], Vec::new());
             for branch in rest {
-                match like[0].is_like(&branch) && union_of(like.iter().chain([&branch]), turns).is_some() {
+                match like[0].is_like(&branch) && union_of(like.iter().chain([&branch]), fast).is_some() {
                     true => like.push(branch),
                     false => other.push(branch),
                 }
             }
             rest = other;
             for like in like.chunks(WIDTH) {
-                let Some(run) = run(tree, parent, like, turns) else { continue };
+                let Some(run) = run(tree, parent, like, fast) else { continue };
                 for branch in like {
                     taken[branch.root..branch.root + branch.nodes.len()].fill(true);
                 }
@@ -74,11 +79,13 @@ fn end_of(tree: &Tree<Expr>, root: usize) -> usize {
     (root + 1..tree.nodes.len()).find(|&i| !inside(i)).unwrap_or(tree.nodes.len())
 }
 
-/// Joins branches of the ground that constraints bind to one another, with those between them.
-fn join(tree: &Tree<Expr>, branches: &mut Vec<Range<usize>>) {
+/// Joins branches of a node or of the ground that constraints bind to one another, with those between them.
+fn join(tree: &Tree<Expr>, parent: Option<usize>, branches: &mut Vec<Range<usize>>) {
     for constraint in &tree.constraints {
         let of = |i: usize| branches.iter().position(|nodes| nodes.contains(&i));
-        let all: Vec<usize> = nodes_of(&constraint.bond).into_iter().flatten().filter_map(of).collect();
+        let ends = nodes_of(&constraint.bond).into_iter().filter(|end| *end != parent);
+        // What leads elsewhere makes no branch.
+        let Some(all) = ends.map(|end| of(end?)).collect::<Option<Vec<usize>>>() else { continue };
         let (Some(&first), Some(&last)) = (all.iter().min(), all.iter().max()) else { continue };
         let joined = branches[first].start..branches[last].end;
         branches.splice(first..=last, [joined]);
@@ -95,7 +102,7 @@ fn nodes_of<S>(bond: &Bond<S>) -> Vec<Option<usize>> {
 
 impl Branch {
     /// The branch of some nodes, if it can be evaluated by itself.
-    fn new(tree: &Tree<Expr>, parent: Option<usize>, range: Range<usize>) -> Option<Branch> {
+    fn new(tree: &Tree<Expr>, parent: Option<usize>, range: Range<usize>, fast: bool) -> Option<Branch> {
         let inside = |i: usize| range.contains(&i);
         // Descendants follow their ancestors without a gap.
         let alone = (0..tree.nodes.len()).all(|i| match tree.nodes[i].parent {
@@ -125,7 +132,7 @@ impl Branch {
         let binds = |c: &&Constraint<Expr>| nodes_of(&c.bond).into_iter().flatten().any(inside);
         let own: Vec<&Constraint<Expr>> = tree.constraints.iter().filter(binds).collect();
         let rows_of = |c: &Constraint<Expr>| c.first..c.first + c.slots.len();
-        let within = |end: Option<usize>| end.map_or(parent.is_none(), inside);
+        let within = |end: Option<usize>| end.is_some_and(inside) || (end == parent && (fast || parent.is_none()));
         let whole = own.iter().all(|c| nodes_of(&c.bond).into_iter().all(within))
             && own.windows(2).all(|pair| rows_of(pair[0]).end == pair[1].first);
         if !whole {
@@ -142,25 +149,31 @@ impl Branch {
             Unknown::Row(row) => Unknown::Row(row - rows.start),
         };
         let unknowns = global.iter().map(unknown).collect();
+        let last = parent.map_or(&tree.solve_at_ground, |p| &tree.nodes[p].elimination.solve_before);
+        let last: Vec<usize> = last.iter().copied().filter(|&g| mine(g)).collect();
+        let solved = |g: usize| last.contains(&g);
+        let open =
+            range.clone().filter(|&i| tree.nodes[i].parent == parent).flat_map(|i| &tree.nodes[i].elimination.open);
+        if parent.is_some() && !(open.copied().all(solved) && (fast || last.is_empty())) {
+            return None;
+        }
         let numbers = Numbers {
             root: range.start,
-            // Node 0 stands for the parent, where it is a node.
-            offset: usize::from(parent.is_some()),
+            parent,
+            offset: parent.map_or(0, |_| 1 + usize::from(!last.is_empty())),
             first: Extent { q: q.start, v: v.start, rows: rows.start },
             first_entry: own.first().map_or(0, |c| c.entry),
             unknowns: &global,
         };
-        let at_ground: Vec<usize> = tree.solve_at_ground.iter().copied().filter(|&g| mine(g)).collect();
-        let open = tree.nodes[range.start].elimination.open.len();
-        if parent.is_some() && (open > 0 || !at_ground.is_empty()) {
+        if parent.is_some() && tree.solve_at_ground.iter().any(|&g| mine(g)) {
             return None;
         }
         Some(Branch {
             root: range.start,
-            nodes: range.map(|i| numbers.node(&tree.nodes[i], parent)).collect::<Option<_>>()?,
+            nodes: range.map(|i| numbers.node(&tree.nodes[i])).collect::<Option<_>>()?,
             constraints: own.into_iter().map(|c| numbers.constraint(c)).collect::<Option<_>>()?,
             unknowns,
-            solve_at_ground: numbers.list(&at_ground)?,
+            solve_last: numbers.list(&last)?,
             first: numbers.first,
             size: Extent { q: q.len(), v: v.len(), rows: rows.len() },
         })
@@ -173,7 +186,7 @@ impl Branch {
         };
         self.nodes.len() == other.nodes.len()
             && self.unknowns == other.unknowns
-            && self.solve_at_ground == other.solve_at_ground
+            && self.solve_last == other.solve_last
             && self.size == other.size
             && self.nodes.iter().zip(&other.nodes).all(same)
             && self.constraints.iter().map(form).eq(other.constraints.iter().map(form))
@@ -217,8 +230,10 @@ fn form(constraint: &Constraint<f64>) -> Constraint<f64> {
 struct Numbers<'a> {
     /// First node.
     root: usize,
-    /// Number that it gets.
+    /// Number that it gets: after one that stands for the parent, where that is a node, and one at which rows are solved, where
+    /// there are some.
     offset: usize,
+    parent: Option<usize>,
     first: Extent,
     first_entry: usize,
     /// The unknowns of the branch.
@@ -227,7 +242,11 @@ struct Numbers<'a> {
 
 impl Numbers<'_> {
     fn of_node(&self, i: usize) -> usize {
-        i - self.root + self.offset
+        if Some(i) == self.parent {
+            self.offset - 1
+        } else {
+            i - self.root + self.offset
+        }
     }
 
     fn unknown(&self, g: usize) -> Option<usize> {
@@ -239,13 +258,13 @@ impl Numbers<'_> {
     }
 
     /// A node with the numbers of its branch; `None` where it has constants that are not numbers, or columns of others.
-    fn node(&self, node: &Node<Expr>, parent: Option<usize>) -> Option<Node<f64>> {
+    fn node(&self, node: &Node<Expr>) -> Option<Node<f64>> {
         let mut constant = true;
         let mut node = map_node(node, &mut number(&mut constant));
         if !constant {
             return None;
         }
-        node.parent = if node.parent == parent { parent.map(|_| 0) } else { node.parent.map(|p| self.of_node(p)) };
+        node.parent = node.parent.map(|p| self.of_node(p));
         if let Source::State { q, v } = &mut node.source {
             (*q, *v) = (*q - self.first.q, *v - self.first.v);
         }
@@ -369,7 +388,7 @@ fn run(tree: &Tree<Expr>, parent: Option<usize>, like: &[Branch], turns: bool) -
         first: first.first,
         size: first.size,
         unknowns: first.unknowns.clone(),
-        solve_at_ground: first.solve_at_ground.clone(),
+        solve_last: first.solve_last.clone(),
         accumulates: parent.is_some_and(|p| tree.nodes[p].elimination.accumulates_momentum),
     };
     let nodes = first.root..first.root + first.nodes.len();

@@ -25,8 +25,8 @@ pub fn together(plan: &Plan, group: Output, options: &Options) -> Option<OutputP
     if options.plan.branches == LikeBranches::Apart {
         return None;
     }
-    let turns = options.arithmetic == Arithmetic::Fast;
-    let built = build::build(plan, group, options, |tree, _| siblings::find(tree, turns))?;
+    let fast = options.arithmetic == Arithmetic::Fast;
+    let built = build::build(plan, group, options, |tree, _| siblings::find(tree, fast))?;
     let count = built.inputs.iter().map(crate::output::InputArray::len).sum::<usize>();
     Some(built.map(|program| {
         let graph = Graph::default();

@@ -30,19 +30,6 @@ fn more_rows_than_there_is_room_for() {
     rows.push([[1.0]]);
 }
 
-/// Blocks of a batch at the end of the columns.
-#[test]
-fn places_after_the_last_state_are_dropped() {
-    let (mut a, mut b) = ([0.0; 5], [0.0; 5]);
-    let mut columns = [&mut a[..], &mut b[..]];
-    let mut block = Columns { columns: &mut columns, at: 3 };
-    block.give(1, &[1.0, 2.0, 3.0, 4.0]);
-    block.set(0, 1, 5.0);
-    block.set(0, 2, 6.0);
-    Columns { columns: &mut columns, at: 1 }.give(0, &[7.0; 2]);
-    assert_eq!((a, b), ([0.0, 7.0, 7.0, 0.0, 5.0], [0.0, 0.0, 0.0, 1.0, 2.0]));
-}
-
 /// `a b + c` in the arithmetic of the call, and in plain arithmetic.
 struct Twice;
 

@@ -143,21 +143,26 @@ fn more_random_trees() {
     assert!(branches > 200, "only {branches} branches are computed together");
 }
 
-/// Branches with loops inside of them, on a floating body and on the ground.
+/// Branches with loops inside of them, on a floating body and on the ground; and loops that close by way of the body, whose rows
+/// are solved at other places than in the sweeps: in fast arithmetic only.
 #[test]
 fn loops_in_branches() {
-    let mut branches = [0; 2];
-    for seed in 0..16 {
-        let (numbers, on) = (NUMBERS[seed as usize % 4], if seed % 8 < 4 { On::Trunk } else { On::Ground });
+    let mut branches = [[0; 2]; 3];
+    for seed in 0..12 {
+        let (numbers, number) = (NUMBERS[seed as usize % 4], seed as usize / 4 % 3);
+        let on = [On::Trunk, On::Ground, On::TrunkBoth][number];
         let model = with_loops(seed, numbers, on);
         for arithmetic in [Arithmetic::Exact, Arithmetic::Fast] {
             let options = options(arithmetic, EliminationStrategy::Single);
             let plan = search::plan(&model, options.plan);
             let what = format!("seed {seed}, {numbers:?}, {on:?}, {arithmetic:?}");
-            branches[usize::from(on == On::Ground)] += compare(&what, &model, &plan, &options);
+            let fast = usize::from(arithmetic == Arithmetic::Fast);
+            branches[number][fast] += compare(&what, &model, &plan, &options);
         }
     }
-    assert!(branches.iter().all(|n| *n > 30), "only {branches:?} branches are computed together");
+    let [on_trunk, on_ground, both_on_trunk] = branches;
+    assert!(on_trunk.iter().chain(&on_ground).all(|n| *n > 8), "only {branches:?} branches are computed together");
+    assert!(both_on_trunk[0] == 0 && both_on_trunk[1] > 8, "{branches:?} branches are computed together");
 }
 
 #[test]
