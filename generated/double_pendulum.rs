@@ -74,9 +74,13 @@ impl DoublePendulum {
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(0, l); }
+        for l in 0..LANES { read_1[l] = q.get(1, l); }
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
+            let q_0 = read_0[l];
+            let q_1 = read_1[l];
             angles[0][l] = q_0;
             angles[1][l] = q_1;
         }
@@ -164,8 +168,10 @@ impl DoublePendulum {
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(1, l); }
         for l in 0..LANES {
-            let q_1 = q.get(1, l);
+            let q_1 = read_0[l];
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
@@ -215,8 +221,10 @@ impl DoublePendulum {
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(1, l); }
         for l in 0..LANES {
-            let q_1 = q.get(1, l);
+            let q_1 = read_0[l];
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
@@ -262,9 +270,13 @@ impl DoublePendulum {
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), energy: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(0, l); }
+        for l in 0..LANES { read_1[l] = q.get(1, l); }
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
+            let q_0 = read_0[l];
+            let q_1 = read_1[l];
             angles[0][l] = q_0;
             angles[1][l] = q_1;
         }
@@ -333,9 +345,13 @@ impl DoublePendulum {
     #[inline(always)]
     fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(0, l); }
+        for l in 0..LANES { read_1[l] = q.get(1, l); }
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
+            let q_0 = read_0[l];
+            let q_1 = read_1[l];
             angles[0][l] = q_0;
             angles[1][l] = q_1;
         }
@@ -417,9 +433,13 @@ impl DoublePendulum {
     #[inline(always)]
     fn reactions_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), reactions: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(0, l); }
+        for l in 0..LANES { read_1[l] = q.get(1, l); }
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
+            let q_0 = read_0[l];
+            let q_1 = read_1[l];
             angles[0][l] = q_0;
             angles[1][l] = q_1;
         }
@@ -560,8 +580,10 @@ impl DoublePendulum {
     #[inline(always)]
     fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(1, l); }
         for l in 0..LANES {
-            let q_1 = q.get(1, l);
+            let q_1 = read_0[l];
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
@@ -599,9 +621,13 @@ impl DoublePendulum {
     #[inline(always)]
     fn frames_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), rotation: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), position: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), velocity: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(0, l); }
+        for l in 0..LANES { read_1[l] = q.get(1, l); }
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
+            let q_0 = read_0[l];
+            let q_1 = read_1[l];
             angles[0][l] = q_0;
             angles[1][l] = q_1;
         }
@@ -783,9 +809,13 @@ impl DoublePendulum {
     #[inline(always)]
     fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(0, l); }
+        for l in 0..LANES { read_1[l] = q.get(1, l); }
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
+            let q_0 = read_0[l];
+            let q_1 = read_1[l];
             angles[0][l] = q_0;
             angles[1][l] = q_1;
         }
@@ -857,9 +887,13 @@ impl DoublePendulum {
     #[inline(always)]
     fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(0, l); }
+        for l in 0..LANES { read_1[l] = q.get(1, l); }
         for l in 0..LANES {
-            let q_0 = q.get(0, l);
-            let q_1 = q.get(1, l);
+            let q_0 = read_0[l];
+            let q_1 = read_1[l];
             angles[0][l] = q_0;
             angles[1][l] = q_1;
         }
@@ -915,8 +949,10 @@ impl DoublePendulum {
     #[inline(always)]
     fn jacobians_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), jacobian: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(1, l); }
         for l in 0..LANES {
-            let q_1 = q.get(1, l);
+            let q_1 = read_0[l];
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
@@ -1038,8 +1074,10 @@ impl DoublePendulum {
     #[inline(always)]
     fn bias_accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), bias: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(1, l); }
         for l in 0..LANES {
-            let q_1 = q.get(1, l);
+            let q_1 = read_0[l];
             angles[0][l] = q_1;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);

@@ -91,9 +91,13 @@ impl Satellite {
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
+        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
         for l in 0..LANES {
-            let drive_q_0 = drive_q.get(0, l);
-            let drive_q_1 = drive_q.get(1, l);
+            let drive_q_0 = read_0[l];
+            let drive_q_1 = read_1[l];
             angles[0][l] = drive_q_0;
             angles[1][l] = drive_q_1;
         }
@@ -504,9 +508,13 @@ impl Satellite {
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
+        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
         for l in 0..LANES {
-            let drive_q_0 = drive_q.get(0, l);
-            let drive_q_1 = drive_q.get(1, l);
+            let drive_q_0 = read_0[l];
+            let drive_q_1 = read_1[l];
             angles[0][l] = drive_q_0;
             angles[1][l] = drive_q_1;
         }
@@ -743,9 +751,13 @@ impl Satellite {
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
+        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
         for l in 0..LANES {
-            let drive_q_0 = drive_q.get(0, l);
-            let drive_q_1 = drive_q.get(1, l);
+            let drive_q_0 = read_0[l];
+            let drive_q_1 = read_1[l];
             angles[0][l] = drive_q_0;
             angles[1][l] = drive_q_1;
         }
@@ -952,9 +964,13 @@ impl Satellite {
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), energy: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
+        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
         for l in 0..LANES {
-            let drive_q_0 = drive_q.get(0, l);
-            let drive_q_1 = drive_q.get(1, l);
+            let drive_q_0 = read_0[l];
+            let drive_q_1 = read_1[l];
             angles[0][l] = drive_q_0;
             angles[1][l] = drive_q_1;
         }
@@ -1228,9 +1244,13 @@ impl Satellite {
     #[inline(always)]
     fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
+        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
         for l in 0..LANES {
-            let drive_q_0 = drive_q.get(0, l);
-            let drive_q_1 = drive_q.get(1, l);
+            let drive_q_0 = read_0[l];
+            let drive_q_1 = read_1[l];
             angles[0][l] = drive_q_0;
             angles[1][l] = drive_q_1;
         }
@@ -1702,9 +1722,13 @@ impl Satellite {
     #[inline(always)]
     fn reactions_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), reactions: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
+        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
         for l in 0..LANES {
-            let drive_q_0 = drive_q.get(0, l);
-            let drive_q_1 = drive_q.get(1, l);
+            let drive_q_0 = read_0[l];
+            let drive_q_1 = read_1[l];
             angles[0][l] = drive_q_0;
             angles[1][l] = drive_q_1;
         }
@@ -2473,9 +2497,13 @@ impl Satellite {
     #[inline(always)]
     fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
+        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
         for l in 0..LANES {
-            let drive_q_0 = drive_q.get(0, l);
-            let drive_q_1 = drive_q.get(1, l);
+            let drive_q_0 = read_0[l];
+            let drive_q_1 = read_1[l];
             angles[0][l] = drive_q_0;
             angles[1][l] = drive_q_1;
         }
@@ -2656,9 +2684,13 @@ impl Satellite {
     #[inline(always)]
     fn frames_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), rotation: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), position: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), velocity: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
+        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
         for l in 0..LANES {
-            let drive_q_0 = drive_q.get(0, l);
-            let drive_q_1 = drive_q.get(1, l);
+            let drive_q_0 = read_0[l];
+            let drive_q_1 = read_1[l];
             angles[0][l] = drive_q_0;
             angles[1][l] = drive_q_1;
         }
@@ -2995,9 +3027,13 @@ impl Satellite {
     #[inline(always)]
     fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
+        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
         for l in 0..LANES {
-            let drive_q_0 = drive_q.get(0, l);
-            let drive_q_1 = drive_q.get(1, l);
+            let drive_q_0 = read_0[l];
+            let drive_q_1 = read_1[l];
             angles[0][l] = drive_q_0;
             angles[1][l] = drive_q_1;
         }
@@ -3376,9 +3412,13 @@ impl Satellite {
     #[inline(always)]
     fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
+        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
         for l in 0..LANES {
-            let drive_q_0 = drive_q.get(0, l);
-            let drive_q_1 = drive_q.get(1, l);
+            let drive_q_0 = read_0[l];
+            let drive_q_1 = read_1[l];
             angles[0][l] = drive_q_0;
             angles[1][l] = drive_q_1;
         }
@@ -3706,9 +3746,13 @@ impl Satellite {
     #[inline(always)]
     fn jacobians_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), jacobian: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
+        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
         for l in 0..LANES {
-            let drive_q_0 = drive_q.get(0, l);
-            let drive_q_1 = drive_q.get(1, l);
+            let drive_q_0 = read_0[l];
+            let drive_q_1 = read_1[l];
             angles[0][l] = drive_q_0;
             angles[1][l] = drive_q_1;
         }
@@ -4022,9 +4066,13 @@ impl Satellite {
     #[inline(always)]
     fn bias_accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), bias: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
+        let mut read_0 = [0.0; LANES];
+        let mut read_1 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
+        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
         for l in 0..LANES {
-            let drive_q_0 = drive_q.get(0, l);
-            let drive_q_1 = drive_q.get(1, l);
+            let drive_q_0 = read_0[l];
+            let drive_q_1 = read_1[l];
             angles[0][l] = drive_q_0;
             angles[1][l] = drive_q_1;
         }

@@ -72,9 +72,10 @@ impl SphericalPendulum {
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        for l in 0..LANES { angles[0][l] = q.get(4, l); }
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = angles[0][l];
+            let q_4 = read_0[l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -300,9 +301,10 @@ impl SphericalPendulum {
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        for l in 0..LANES { angles[0][l] = q.get(4, l); }
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = angles[0][l];
+            let q_4 = read_0[l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -398,9 +400,10 @@ impl SphericalPendulum {
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        for l in 0..LANES { angles[0][l] = q.get(4, l); }
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = angles[0][l];
+            let q_4 = read_0[l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -487,9 +490,10 @@ impl SphericalPendulum {
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), energy: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        for l in 0..LANES { angles[0][l] = q.get(4, l); }
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = angles[0][l];
+            let q_4 = read_0[l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -621,9 +625,10 @@ impl SphericalPendulum {
     #[inline(always)]
     fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        for l in 0..LANES { angles[0][l] = q.get(4, l); }
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = angles[0][l];
+            let q_4 = read_0[l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -842,9 +847,10 @@ impl SphericalPendulum {
     #[inline(always)]
     fn reactions_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), reactions: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        for l in 0..LANES { angles[0][l] = q.get(4, l); }
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = angles[0][l];
+            let q_4 = read_0[l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -1192,9 +1198,10 @@ impl SphericalPendulum {
     #[inline(always)]
     fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        for l in 0..LANES { angles[0][l] = q.get(4, l); }
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = angles[0][l];
+            let q_4 = read_0[l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -1283,9 +1290,10 @@ impl SphericalPendulum {
     #[inline(always)]
     fn frames_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), rotation: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), position: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), velocity: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        for l in 0..LANES { angles[0][l] = q.get(4, l); }
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = angles[0][l];
+            let q_4 = read_0[l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -1512,9 +1520,10 @@ impl SphericalPendulum {
     #[inline(always)]
     fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        for l in 0..LANES { angles[0][l] = q.get(4, l); }
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = angles[0][l];
+            let q_4 = read_0[l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -1700,9 +1709,10 @@ impl SphericalPendulum {
     #[inline(always)]
     fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        for l in 0..LANES { angles[0][l] = q.get(4, l); }
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = angles[0][l];
+            let q_4 = read_0[l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -1856,9 +1866,10 @@ impl SphericalPendulum {
     #[inline(always)]
     fn jacobians_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), jacobian: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        for l in 0..LANES { angles[0][l] = q.get(4, l); }
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = angles[0][l];
+            let q_4 = read_0[l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }
@@ -2012,9 +2023,10 @@ impl SphericalPendulum {
     #[inline(always)]
     fn bias_accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), bias: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        for l in 0..LANES { angles[0][l] = q.get(4, l); }
+        let mut read_0 = [0.0; LANES];
+        for l in 0..LANES { read_0[l] = q.get(4, l); }
         for l in 0..LANES {
-            let q_4 = angles[0][l];
+            let q_4 = read_0[l];
             let tail_t0 = q_4 + 1.4711276743037347;
             angles[0][l] = tail_t0;
         }

@@ -118,8 +118,8 @@ impl<'a> Straight<'a> {
     fn row(&self, name: &str, k: usize) -> String {
         match (self.in_one_array(), name) {
             (false, _) => format!("{name}_{k}"),
-            (true, "given") => format!("rows[{k}]"),
-            (true, _) => format!("rows[{}]", self.given + k),
+            (true, "result") => format!("rows[{}]", self.given + k),
+            (true, _) => format!("rows[{k}]"),
         }
     }
 
@@ -140,10 +140,20 @@ impl<'a> Straight<'a> {
             return;
         }
         let _ = writeln!(out, "        let mut angles = {};", self.head.rows(n));
-        let (set, copied) = self.write_inputs_of_angles(out);
+        // No vectors are made of a loop whose inputs may overlap with what it writes. In one array, its rows are free until the
+        // inputs of the other loop are copied.
+        let read: Vec<(u32, u32)> = self.given_of(&self.angles.before).collect();
+        let copied = if !self.in_one_array() {
+            self.head.locals(out, "        ", "read", read.len());
+            self.write_copies(out, "read", read.into_iter())
+        } else if read.len() <= self.locations() {
+            self.write_copies(out, "read", read.into_iter())
+        } else {
+            BTreeMap::new()
+        };
         let _ = writeln!(out, "        for l in 0..LANES {{");
-        self.write_steps(out, &set, &copied, false);
-        for (k, angle) in self.angles.early.keys().enumerate().filter(|(_, angle)| set.contains(angle)) {
+        self.write_steps(out, &self.angles.before, &copied, false);
+        for (k, angle) in self.angles.early.keys().enumerate() {
             let _ = writeln!(out, "            angles[{k}][l] = {};", self.names[angle]);
         }
         let _ = writeln!(out, "        }}");
@@ -153,31 +163,6 @@ impl<'a> Straight<'a> {
                 let _ = writeln!(out, "        {} = {name}[{k}];", self.row_of_angle(name, k));
             }
         }
-    }
-
-    /// Where some angles are more than an input, copies inputs to the rows of angles, and gives the steps that are left, with the
-    /// rows that they read: no vectors are made of a loop whose inputs may overlap with what it writes.
-    fn write_inputs_of_angles(&self, out: &mut String) -> (BTreeSet<u32>, BTreeMap<u32, String>) {
-        let inputs: BTreeMap<u32, u32> = self.given_of(&self.angles.before).collect();
-        let angles: Vec<u32> = self.angles.early.keys().copied().collect();
-        let mut set: BTreeSet<u32> = angles.iter().copied().filter(|angle| !inputs.contains_key(angle)).collect();
-        let mut free = (0..angles.len()).filter(|k| set.contains(&angles[*k])).collect::<Vec<_>>().into_iter();
-        for (id, op, _) in self.program.steps.iter().rev() {
-            if set.contains(id) {
-                set.extend(nodes(op));
-            }
-        }
-        let row = |id: &u32| angles.iter().position(|angle| angle == id).or_else(|| free.next());
-        let read: BTreeSet<u32> = inputs.keys().copied().filter(|id| set.contains(id) || angles.contains(id)).collect();
-        let rows: Option<Vec<usize>> = read.iter().map(row).collect();
-        let Some(rows) = rows.filter(|_| !set.is_empty()) else { return (self.angles.before.clone(), BTreeMap::new()) };
-        let mut copied = BTreeMap::new();
-        for (id, row) in read.into_iter().zip(rows) {
-            let from = self.head.input(inputs[&id] as usize, "", "l");
-            let _ = writeln!(out, "        for l in 0..LANES {{ angles[{row}][l] = {from}; }}");
-            copied.insert(id, format!("angles[{row}]"));
-        }
-        (set, copied)
     }
 
     /// Those of the program's steps that are in a set, in order. Many statements are written in blocks that return the
@@ -281,12 +266,22 @@ impl<'a> Straight<'a> {
         if !self.in_one_array() {
             self.head.locals(out, "        ", "given", self.given);
         }
+        self.write_copies(out, "given", self.given())
+    }
+
+    /// Copies inputs into rows, and tells which.
+    fn write_copies(
+        &self,
+        out: &mut String,
+        name: &str,
+        inputs: impl Iterator<Item = (u32, u32)>,
+    ) -> BTreeMap<u32, String> {
         let copy = |(to, (id, k)): (usize, (u32, u32))| {
-            let (row, from) = (self.row("given", to), self.head.input(k as usize, "", "l"));
+            let (row, from) = (self.row(name, to), self.head.input(k as usize, "", "l"));
             let _ = writeln!(out, "        for l in 0..LANES {{ {row}[l] = {from}; }}");
             (id, row)
         };
-        self.given().enumerate().map(copy).collect()
+        inputs.enumerate().map(copy).collect()
     }
 
     /// Results are collected in arrays before they are written to the arguments.
