@@ -16,6 +16,7 @@ use crate::symbolic::Expr;
 pub const WIDTH: usize = 4;
 
 /// A branch by itself: nodes, coordinates, unknowns, rows and entries of `Φ` are numbered from its first ones.
+#[derive(Clone)]
 struct Branch {
     root: usize,
     nodes: Vec<Node<f64>>,
@@ -201,18 +202,18 @@ impl Branch {
         self.nodes.iter().map(|node| &node.place).chain(frames.flatten())
     }
 
-    /// Its nodes and constraints, with placements that have given steps.
-    fn with_steps(&self, steps: &[Steps], turns: bool) -> Option<(Vec<Node<f64>>, Vec<Constraint<f64>>)> {
-        let (mut nodes, mut constraints) = (self.nodes.clone(), self.constraints.clone());
-        let frames = constraints.iter_mut().filter_map(|c| match &mut c.bond {
+    /// The same with placements that have given steps.
+    fn with_steps(&self, steps: &[Steps], turns: bool) -> Option<Branch> {
+        let mut branch = self.clone();
+        let frames = branch.constraints.iter_mut().filter_map(|c| match &mut c.bond {
             Bond::Cut(cut) => Some([&mut cut.a.place, &mut cut.b.place]),
             Bond::Coupling { .. } => None,
         });
-        let places = nodes.iter_mut().map(|node| &mut node.place).chain(frames.flatten());
+        let places = branch.nodes.iter_mut().map(|node| &mut node.place).chain(frames.flatten());
         for (place, steps) in places.zip(steps) {
             *place = padded(place, steps, turns)?;
         }
-        Some((nodes, constraints))
+        Some(branch)
     }
 }
 
@@ -366,20 +367,19 @@ fn run(tree: &Tree<Expr>, parent: Option<usize>, like: &[Branch], turns: bool) -
         return None;
     }
     let steps = union_of(like.iter(), turns)?;
-    let all: Vec<(Vec<Node<f64>>, Vec<Constraint<f64>>)> =
-        like.iter().map(|branch| branch.with_steps(&steps, turns)).collect::<Option<_>>()?;
+    let all: Vec<Branch> = like.iter().map(|branch| branch.with_steps(&steps, turns)).collect::<Option<_>>()?;
     let mut table = vec![Vec::new(); like.len()];
-    let node = |k: usize| all.iter().map(|(nodes, _)| nodes[k].clone()).collect::<Vec<_>>();
+    let node = |k: usize| all.iter().map(|branch| branch.nodes[k].clone()).collect::<Vec<_>>();
     let template = (0..first.nodes.len()).map(|k| columns_of(&node(k), &mut table)).collect();
     let mut constraints = Vec::new();
-    for k in 0..first.constraints.len() {
-        let numbers = |(_, constraints): &(_, Vec<Constraint<f64>>)| {
+    for (k, constraint) in all[0].constraints.iter().enumerate() {
+        let numbers = |branch: &Branch| {
             let mut numbers = Vec::new();
-            map_constraint(&constraints[k], &mut |x| numbers.push(x));
+            map_constraint(&branch.constraints[k], &mut |x| numbers.push(x));
             numbers
         };
         let mut slots = slots_of(&all.iter().map(numbers).collect::<Vec<_>>(), &mut table).into_iter();
-        constraints.push(map_constraint(&all[0].1[k], &mut |_| slots.next().unwrap_or(Slot::Const(0.0))));
+        constraints.push(map_constraint(constraint, &mut |_| slots.next().unwrap_or(Slot::Const(0.0))));
     }
     let branches = Branches {
         parent,
