@@ -71,15 +71,22 @@ pub fn build(
     Some(OutputProgram { spec: group.spec(), inputs: line.given.arrays, program })
 }
 
-/// The tree without the constraints inside of branches, in which nothing else asks for them.
+/// The tree without the constraints inside of branches, and without columns of their unknowns, which nothing else asks for.
 fn without_inner<'g>(mut tree: Tree<Expr<'g>>, runs: &[Run]) -> Tree<Expr<'g>> {
     for run in runs {
         let Some(branches) = &run.branches else { continue };
         for turn in 0..run.count() {
-            let first = branches.first.rows + turn * branches.stride.rows;
-            let rows = first..first + branches.size.rows;
-            tree.constraints.retain(|c| !rows.contains(&c.first));
-            let outer = |g: usize| !matches!(tree.unknowns[g], Unknown::Row(row) if rows.contains(&row));
+            let within = |at: usize, first: usize, stride: usize, size: usize| {
+                (first + turn * stride..first + turn * stride + size).contains(&at)
+            };
+            let (first, stride, size) = (branches.first, branches.stride, branches.size);
+            let rows = |row: usize| within(row, first.rows, stride.rows, size.rows);
+            tree.constraints.retain(|c| !rows(c.first));
+            // What is solved at the ground in the branches meets nothing else there.
+            let outer = |g: usize| match tree.unknowns[g] {
+                Unknown::Row(row) => !rows(row),
+                Unknown::Velocity(v) => !within(v, first.v, stride.v, size.v),
+            };
             tree.solve_at_ground.retain(|&g| outer(g));
             tree.nodes.iter_mut().for_each(|node| node.elimination.retain_columns(outer));
         }

@@ -152,7 +152,7 @@ impl Branch {
         let unknowns = global.iter().map(unknown).collect();
         let last = parent.map_or(&tree.solve_at_ground, |p| &tree.nodes[p].elimination.solve_before);
         let last: Vec<usize> = last.iter().copied().filter(|&g| mine(g)).collect();
-        let solved = |g: usize| last.contains(&g);
+        let solved = |g: usize| last.contains(&g) && matches!(tree.unknowns[g], Unknown::Row(_));
         let open =
             range.clone().filter(|&i| tree.nodes[i].parent == parent).flat_map(|i| &tree.nodes[i].elimination.open);
         if parent.is_some() && !(open.copied().all(solved) && (fast || last.is_empty())) {

@@ -179,6 +179,19 @@ fn legs_of_solo12() {
     }
 }
 
+/// Legs on the ground and arms on a waist that is in no set: a humanoid that hangs from its pelvis.
+#[test]
+fn limbs_of_a_hanging_g1() {
+    let model = wide::model("g1.urdf", Base::Fixed);
+    for elimination in [EliminationStrategy::Single, EliminationStrategy::Fastest] {
+        let plan = search::plan(&model, options(Arithmetic::Exact, elimination).plan);
+        for arithmetic in [Arithmetic::Exact, Arithmetic::Fast] {
+            let options = options(arithmetic, elimination);
+            assert_eq!(compare("g1", &model, &plan, &options), 4, "{elimination:?}, {arithmetic:?}");
+        }
+    }
+}
+
 /// Also the legs and the arms of a humanoid.
 #[test]
 #[ignore = "takes half a minute: cargo test -p mbd-testing --test code together -- --ignored"]
