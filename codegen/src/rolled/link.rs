@@ -115,7 +115,7 @@ impl<'g, 'a> Link<'g, 'a> {
             second: symbols(&LinkInput::Second, nv),
             third: symbols(&LinkInput::Third, if group.spec().inputs.len() > 2 { nv } else { 0 }),
             tau: symbols(&LinkInput::Tau, if efforts { nv } else { 0 }),
-            // What the dummy is driven by; nothing reads it.
+            // The node at which rows are solved stands still by these; nothing reads them for the dummy.
             drive: [vec![zero; 3], vec![zero; 3], vec![zero; 3]],
             wrenches: Vec::new(),
             params: Vec::new(),
