@@ -74,16 +74,8 @@ impl DoublePendulum {
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(0, l); }
-        for l in 0..LANES { read_1[l] = q.get(1, l); }
-        for l in 0..LANES {
-            let q_0 = read_0[l];
-            let q_1 = read_1[l];
-            angles[0][l] = q_0;
-            angles[1][l] = q_1;
-        }
+        for l in 0..LANES { angles[0][l] = q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -168,12 +160,7 @@ impl DoublePendulum {
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        let mut read_0 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES {
-            let q_1 = read_0[l];
-            angles[0][l] = q_1;
-        }
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -221,12 +208,7 @@ impl DoublePendulum {
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        let mut read_0 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES {
-            let q_1 = read_0[l];
-            angles[0][l] = q_1;
-        }
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -270,16 +252,8 @@ impl DoublePendulum {
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), energy: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(0, l); }
-        for l in 0..LANES { read_1[l] = q.get(1, l); }
-        for l in 0..LANES {
-            let q_0 = read_0[l];
-            let q_1 = read_1[l];
-            angles[0][l] = q_0;
-            angles[1][l] = q_1;
-        }
+        for l in 0..LANES { angles[0][l] = q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -345,16 +319,8 @@ impl DoublePendulum {
     #[inline(always)]
     fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(0, l); }
-        for l in 0..LANES { read_1[l] = q.get(1, l); }
-        for l in 0..LANES {
-            let q_0 = read_0[l];
-            let q_1 = read_1[l];
-            angles[0][l] = q_0;
-            angles[1][l] = q_1;
-        }
+        for l in 0..LANES { angles[0][l] = q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -433,16 +399,8 @@ impl DoublePendulum {
     #[inline(always)]
     fn reactions_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), reactions: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(0, l); }
-        for l in 0..LANES { read_1[l] = q.get(1, l); }
-        for l in 0..LANES {
-            let q_0 = read_0[l];
-            let q_1 = read_1[l];
-            angles[0][l] = q_0;
-            angles[1][l] = q_1;
-        }
+        for l in 0..LANES { angles[0][l] = q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -580,12 +538,7 @@ impl DoublePendulum {
     #[inline(always)]
     fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        let mut read_0 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES {
-            let q_1 = read_0[l];
-            angles[0][l] = q_1;
-        }
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut result_0 = [0.0; LANES];
         let mut result_1 = [0.0; LANES];
@@ -621,16 +574,8 @@ impl DoublePendulum {
     #[inline(always)]
     fn frames_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), rotation: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), position: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), velocity: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(0, l); }
-        for l in 0..LANES { read_1[l] = q.get(1, l); }
-        for l in 0..LANES {
-            let q_0 = read_0[l];
-            let q_1 = read_1[l];
-            angles[0][l] = q_0;
-            angles[1][l] = q_1;
-        }
+        for l in 0..LANES { angles[0][l] = q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -809,16 +754,8 @@ impl DoublePendulum {
     #[inline(always)]
     fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(0, l); }
-        for l in 0..LANES { read_1[l] = q.get(1, l); }
-        for l in 0..LANES {
-            let q_0 = read_0[l];
-            let q_1 = read_1[l];
-            angles[0][l] = q_0;
-            angles[1][l] = q_1;
-        }
+        for l in 0..LANES { angles[0][l] = q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -887,16 +824,8 @@ impl DoublePendulum {
     #[inline(always)]
     fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(0, l); }
-        for l in 0..LANES { read_1[l] = q.get(1, l); }
-        for l in 0..LANES {
-            let q_0 = read_0[l];
-            let q_1 = read_1[l];
-            angles[0][l] = q_0;
-            angles[1][l] = q_1;
-        }
+        for l in 0..LANES { angles[0][l] = q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -949,12 +878,7 @@ impl DoublePendulum {
     #[inline(always)]
     fn jacobians_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), jacobian: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        let mut read_0 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES {
-            let q_1 = read_0[l];
-            angles[0][l] = q_1;
-        }
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut result_0 = [0.0; LANES];
         let mut result_1 = [0.0; LANES];
@@ -1074,12 +998,7 @@ impl DoublePendulum {
     #[inline(always)]
     fn bias_accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), bias: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 1]);
-        let mut read_0 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES {
-            let q_1 = read_0[l];
-            angles[0][l] = q_1;
-        }
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 1>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];

@@ -87,31 +87,16 @@ impl Panda {
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
+        for l in 0..LANES { angles[1][l] = q.get(2, l); }
+        for l in 0..LANES { angles[2][l] = q.get(3, l); }
+        for l in 0..LANES { angles[3][l] = q.get(4, l); }
+        for l in 0..LANES { angles[4][l] = q.get(5, l); }
         let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        let mut read_2 = [0.0; LANES];
-        let mut read_3 = [0.0; LANES];
-        let mut read_4 = [0.0; LANES];
-        let mut read_5 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES { read_1[l] = q.get(2, l); }
-        for l in 0..LANES { read_2[l] = q.get(3, l); }
-        for l in 0..LANES { read_3[l] = q.get(4, l); }
-        for l in 0..LANES { read_4[l] = q.get(5, l); }
-        for l in 0..LANES { read_5[l] = q.get(6, l); }
+        for l in 0..LANES { read_0[l] = q.get(6, l); }
         for l in 0..LANES {
-            let q_1 = read_0[l];
-            let q_2 = read_1[l];
-            let q_3 = read_2[l];
-            let q_4 = read_3[l];
-            let q_5 = read_4[l];
-            let q_6 = read_5[l];
+            let q_6 = read_0[l];
             let panda_link7_t0 = q_6 - 0.7853981633974483;
-            angles[0][l] = q_1;
-            angles[1][l] = q_2;
-            angles[2][l] = q_3;
-            angles[3][l] = q_4;
-            angles[4][l] = q_5;
             angles[5][l] = panda_link7_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
@@ -1210,31 +1195,16 @@ impl Panda {
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
+        for l in 0..LANES { angles[1][l] = q.get(2, l); }
+        for l in 0..LANES { angles[2][l] = q.get(3, l); }
+        for l in 0..LANES { angles[3][l] = q.get(4, l); }
+        for l in 0..LANES { angles[4][l] = q.get(5, l); }
         let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        let mut read_2 = [0.0; LANES];
-        let mut read_3 = [0.0; LANES];
-        let mut read_4 = [0.0; LANES];
-        let mut read_5 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES { read_1[l] = q.get(2, l); }
-        for l in 0..LANES { read_2[l] = q.get(3, l); }
-        for l in 0..LANES { read_3[l] = q.get(4, l); }
-        for l in 0..LANES { read_4[l] = q.get(5, l); }
-        for l in 0..LANES { read_5[l] = q.get(6, l); }
+        for l in 0..LANES { read_0[l] = q.get(6, l); }
         for l in 0..LANES {
-            let q_1 = read_0[l];
-            let q_2 = read_1[l];
-            let q_3 = read_2[l];
-            let q_4 = read_3[l];
-            let q_5 = read_4[l];
-            let q_6 = read_5[l];
+            let q_6 = read_0[l];
             let panda_link7_t0 = q_6 - 0.7853981633974483;
-            angles[0][l] = q_1;
-            angles[1][l] = q_2;
-            angles[2][l] = q_3;
-            angles[3][l] = q_4;
-            angles[4][l] = q_5;
             angles[5][l] = panda_link7_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
@@ -1939,31 +1909,16 @@ impl Panda {
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
+        for l in 0..LANES { angles[1][l] = q.get(2, l); }
+        for l in 0..LANES { angles[2][l] = q.get(3, l); }
+        for l in 0..LANES { angles[3][l] = q.get(4, l); }
+        for l in 0..LANES { angles[4][l] = q.get(5, l); }
         let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        let mut read_2 = [0.0; LANES];
-        let mut read_3 = [0.0; LANES];
-        let mut read_4 = [0.0; LANES];
-        let mut read_5 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES { read_1[l] = q.get(2, l); }
-        for l in 0..LANES { read_2[l] = q.get(3, l); }
-        for l in 0..LANES { read_3[l] = q.get(4, l); }
-        for l in 0..LANES { read_4[l] = q.get(5, l); }
-        for l in 0..LANES { read_5[l] = q.get(6, l); }
+        for l in 0..LANES { read_0[l] = q.get(6, l); }
         for l in 0..LANES {
-            let q_1 = read_0[l];
-            let q_2 = read_1[l];
-            let q_3 = read_2[l];
-            let q_4 = read_3[l];
-            let q_5 = read_4[l];
-            let q_6 = read_5[l];
+            let q_6 = read_0[l];
             let panda_link7_t0 = q_6 - 0.7853981633974483;
-            angles[0][l] = q_1;
-            angles[1][l] = q_2;
-            angles[2][l] = q_3;
-            angles[3][l] = q_4;
-            angles[4][l] = q_5;
             angles[5][l] = panda_link7_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
@@ -2439,31 +2394,16 @@ impl Panda {
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), energy: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
+        for l in 0..LANES { angles[1][l] = q.get(2, l); }
+        for l in 0..LANES { angles[2][l] = q.get(3, l); }
+        for l in 0..LANES { angles[3][l] = q.get(4, l); }
+        for l in 0..LANES { angles[4][l] = q.get(5, l); }
         let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        let mut read_2 = [0.0; LANES];
-        let mut read_3 = [0.0; LANES];
-        let mut read_4 = [0.0; LANES];
-        let mut read_5 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES { read_1[l] = q.get(2, l); }
-        for l in 0..LANES { read_2[l] = q.get(3, l); }
-        for l in 0..LANES { read_3[l] = q.get(4, l); }
-        for l in 0..LANES { read_4[l] = q.get(5, l); }
-        for l in 0..LANES { read_5[l] = q.get(6, l); }
+        for l in 0..LANES { read_0[l] = q.get(6, l); }
         for l in 0..LANES {
-            let q_1 = read_0[l];
-            let q_2 = read_1[l];
-            let q_3 = read_2[l];
-            let q_4 = read_3[l];
-            let q_5 = read_4[l];
-            let q_6 = read_5[l];
+            let q_6 = read_0[l];
             let panda_link7_t0 = q_6 - 0.7853981633974483;
-            angles[0][l] = q_1;
-            angles[1][l] = q_2;
-            angles[2][l] = q_3;
-            angles[3][l] = q_4;
-            angles[4][l] = q_5;
             angles[5][l] = panda_link7_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);
@@ -3185,31 +3125,16 @@ impl Panda {
     #[inline(always)]
     fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 6]);
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
+        for l in 0..LANES { angles[1][l] = q.get(2, l); }
+        for l in 0..LANES { angles[2][l] = q.get(3, l); }
+        for l in 0..LANES { angles[3][l] = q.get(4, l); }
+        for l in 0..LANES { angles[4][l] = q.get(5, l); }
         let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        let mut read_2 = [0.0; LANES];
-        let mut read_3 = [0.0; LANES];
-        let mut read_4 = [0.0; LANES];
-        let mut read_5 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES { read_1[l] = q.get(2, l); }
-        for l in 0..LANES { read_2[l] = q.get(3, l); }
-        for l in 0..LANES { read_3[l] = q.get(4, l); }
-        for l in 0..LANES { read_4[l] = q.get(5, l); }
-        for l in 0..LANES { read_5[l] = q.get(6, l); }
+        for l in 0..LANES { read_0[l] = q.get(6, l); }
         for l in 0..LANES {
-            let q_1 = read_0[l];
-            let q_2 = read_1[l];
-            let q_3 = read_2[l];
-            let q_4 = read_3[l];
-            let q_5 = read_4[l];
-            let q_6 = read_5[l];
+            let q_6 = read_0[l];
             let panda_link7_t0 = q_6 - 0.7853981633974483;
-            angles[0][l] = q_1;
-            angles[1][l] = q_2;
-            angles[2][l] = q_3;
-            angles[3][l] = q_4;
-            angles[4][l] = q_5;
             angles[5][l] = panda_link7_t0;
         }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 6>(&angles);

@@ -91,16 +91,8 @@ impl Satellite {
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
-        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
-        for l in 0..LANES {
-            let drive_q_0 = read_0[l];
-            let drive_q_1 = read_1[l];
-            angles[0][l] = drive_q_0;
-            angles[1][l] = drive_q_1;
-        }
+        for l in 0..LANES { angles[0][l] = drive_q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = drive_q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -508,16 +500,8 @@ impl Satellite {
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
-        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
-        for l in 0..LANES {
-            let drive_q_0 = read_0[l];
-            let drive_q_1 = read_1[l];
-            angles[0][l] = drive_q_0;
-            angles[1][l] = drive_q_1;
-        }
+        for l in 0..LANES { angles[0][l] = drive_q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = drive_q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -751,16 +735,8 @@ impl Satellite {
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
-        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
-        for l in 0..LANES {
-            let drive_q_0 = read_0[l];
-            let drive_q_1 = read_1[l];
-            angles[0][l] = drive_q_0;
-            angles[1][l] = drive_q_1;
-        }
+        for l in 0..LANES { angles[0][l] = drive_q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = drive_q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -964,16 +940,8 @@ impl Satellite {
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), energy: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
-        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
-        for l in 0..LANES {
-            let drive_q_0 = read_0[l];
-            let drive_q_1 = read_1[l];
-            angles[0][l] = drive_q_0;
-            angles[1][l] = drive_q_1;
-        }
+        for l in 0..LANES { angles[0][l] = drive_q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = drive_q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -1244,16 +1212,8 @@ impl Satellite {
     #[inline(always)]
     fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
-        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
-        for l in 0..LANES {
-            let drive_q_0 = read_0[l];
-            let drive_q_1 = read_1[l];
-            angles[0][l] = drive_q_0;
-            angles[1][l] = drive_q_1;
-        }
+        for l in 0..LANES { angles[0][l] = drive_q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = drive_q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -1722,16 +1682,8 @@ impl Satellite {
     #[inline(always)]
     fn reactions_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), reactions: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
-        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
-        for l in 0..LANES {
-            let drive_q_0 = read_0[l];
-            let drive_q_1 = read_1[l];
-            angles[0][l] = drive_q_0;
-            angles[1][l] = drive_q_1;
-        }
+        for l in 0..LANES { angles[0][l] = drive_q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = drive_q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -2497,16 +2449,8 @@ impl Satellite {
     #[inline(always)]
     fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
-        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
-        for l in 0..LANES {
-            let drive_q_0 = read_0[l];
-            let drive_q_1 = read_1[l];
-            angles[0][l] = drive_q_0;
-            angles[1][l] = drive_q_1;
-        }
+        for l in 0..LANES { angles[0][l] = drive_q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = drive_q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut result_0 = [0.0; LANES];
         let mut result_1 = [0.0; LANES];
@@ -2684,16 +2628,8 @@ impl Satellite {
     #[inline(always)]
     fn frames_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), rotation: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), position: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), velocity: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
-        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
-        for l in 0..LANES {
-            let drive_q_0 = read_0[l];
-            let drive_q_1 = read_1[l];
-            angles[0][l] = drive_q_0;
-            angles[1][l] = drive_q_1;
-        }
+        for l in 0..LANES { angles[0][l] = drive_q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = drive_q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -3027,16 +2963,8 @@ impl Satellite {
     #[inline(always)]
     fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
-        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
-        for l in 0..LANES {
-            let drive_q_0 = read_0[l];
-            let drive_q_1 = read_1[l];
-            angles[0][l] = drive_q_0;
-            angles[1][l] = drive_q_1;
-        }
+        for l in 0..LANES { angles[0][l] = drive_q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = drive_q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -3412,16 +3340,8 @@ impl Satellite {
     #[inline(always)]
     fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), wrenches: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
-        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
-        for l in 0..LANES {
-            let drive_q_0 = read_0[l];
-            let drive_q_1 = read_1[l];
-            angles[0][l] = drive_q_0;
-            angles[1][l] = drive_q_1;
-        }
+        for l in 0..LANES { angles[0][l] = drive_q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = drive_q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];
@@ -3746,16 +3666,8 @@ impl Satellite {
     #[inline(always)]
     fn jacobians_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), jacobian: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
-        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
-        for l in 0..LANES {
-            let drive_q_0 = read_0[l];
-            let drive_q_1 = read_1[l];
-            angles[0][l] = drive_q_0;
-            angles[1][l] = drive_q_1;
-        }
+        for l in 0..LANES { angles[0][l] = drive_q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = drive_q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut result_0 = [0.0; LANES];
         let mut result_1 = [0.0; LANES];
@@ -4066,16 +3978,8 @@ impl Satellite {
     #[inline(always)]
     fn bias_accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), drive_a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), bias: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 2]);
-        let mut read_0 = [0.0; LANES];
-        let mut read_1 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = drive_q.get(0, l); }
-        for l in 0..LANES { read_1[l] = drive_q.get(1, l); }
-        for l in 0..LANES {
-            let drive_q_0 = read_0[l];
-            let drive_q_1 = read_1[l];
-            angles[0][l] = drive_q_0;
-            angles[1][l] = drive_q_1;
-        }
+        for l in 0..LANES { angles[0][l] = drive_q.get(0, l); }
+        for l in 0..LANES { angles[1][l] = drive_q.get(1, l); }
         let (sines, cosines) = ::multibody::runtime::trig::pairs_f64::<::multibody::runtime::kernel::Plain, LANES, 2>(&angles);
         let mut given_0 = [0.0; LANES];
         let mut given_1 = [0.0; LANES];

@@ -5,19 +5,22 @@ use mbd_codegen::options::LikeBranches;
 use mbd_codegen::read::{self, Base, ImportOptions};
 use mbd_codegen::{generate::generate_from, search, Arithmetic, Options, Output};
 
-/// Files of `models` (none: [`five_bar_legs`]), how their roots are connected, and how many of them stand side by side on the ground.
-const SCENES: [(&str, &str, Base, usize); 5] = [
+/// Files of `models` (none: [`five_bar_legs`] or [`pinned_feet`]), how their roots are connected, and how many of them stand side by
+/// side on the ground.
+const SCENES: [(&str, &str, Base, usize); 6] = [
     ("solo12", "solo12.urdf", Base::Floating, 1),
     ("g1", "g1.urdf", Base::Floating, 1),
     ("arms", "ur5.urdf", Base::Fixed, 2),
     ("four_bars", "mechanisms/fourbar.toml", Base::Fixed, 50),
     ("five_bars", "", Base::Fixed, 1),
+    ("feet", "", Base::Fixed, 1),
 ];
 
 fn main() {
     let out = std::env::var("OUT_DIR").expect("cargo sets it");
     for (name, file, base, count) in SCENES {
         let (path, text) = match file {
+            "" if name == "feet" => ("pinned_feet.toml".to_string(), pinned_feet()),
             "" => ("five_bar_legs.toml".to_string(), five_bar_legs()),
             file => {
                 let path = format!("../../models/{file}");
@@ -42,29 +45,60 @@ fn main() {
     }
 }
 
+/// Where the legs of a quadruped begin on its trunk.
+const LEGS: [(&str, [f64; 2]); 4] =
+    [("lf", [0.2, 0.1]), ("rf", [0.2, -0.1]), ("lh", [-0.2, 0.1]), ("rh", [-0.2, -0.1])];
+
+fn body(name: &str, mass: f64, com: f64, size: f64) -> String {
+    format!("[[body]]\nname = \"{name}\"\nmass = {mass}\ncom = [{com}, 0, 0]\ninertia = [{size}, {size}, {size}]\n\n")
+}
+
+fn revolute(child: &str, parent: &str, at: [f64; 3], axis: [u8; 3]) -> String {
+    format!(
+        "[[joint]]\nname = \"j_{child}\"\ntype = \"revolute\"\nparent = \"{parent}\"\nchild = \"{child}\"\nxyz = {at:?}\n\
+         axis = {axis:?}\n\n"
+    )
+}
+
+/// A trunk that moves freely.
+fn trunk(name: &str) -> String {
+    let trunk = body("trunk", 5.0, 0.01, 0.1);
+    let joint = "[[joint]]\nname = \"j_trunk\"\ntype = \"floating\"\nchild = \"trunk\"\n\n";
+    format!("name = \"{name}\"\ngravity = [0, 0, -9.81]\n\n{trunk}{joint}")
+}
+
 /// A quadruped each of whose legs is a planar five-bar: two motors on the trunk, whose links meet in the foot.
 fn five_bar_legs() -> String {
-    let body = |name: &str, mass: f64, com: f64, size: f64| {
-        format!(
-            "[[body]]\nname = \"{name}\"\nmass = {mass}\ncom = [{com}, 0, 0]\ninertia = [{size}, {size}, {size}]\n\n"
-        )
-    };
-    let joint = |child: &str, parent: &str, kind: &str, at: [f64; 3]| {
-        format!("[[joint]]\nname = \"j_{child}\"\ntype = \"{kind}\"\n{parent}child = \"{child}\"\nxyz = {at:?}\naxis = [0, 1, 0]\n\n")
-    };
-    let mut text = "name = \"five_bar_legs\"\ngravity = [0, 0, -9.81]\n\n".to_string() + &body("trunk", 5.0, 0.01, 0.1);
-    text += &joint("trunk", "", "floating", [0.0; 3]).replace("xyz = [0.0, 0.0, 0.0]\naxis = [0, 1, 0]\n", "");
-    for (leg, [x, y]) in [("lf", [0.2, 0.1]), ("rf", [0.2, -0.1]), ("lh", [-0.2, 0.1]), ("rh", [-0.2, -0.1])] {
+    let mut text = trunk("five_bar_legs");
+    for (leg, [x, y]) in LEGS {
         for (side, dx) in [("front", 0.02), ("back", -0.02)] {
             let (upper, lower) = (format!("{leg}_{side}_upper"), format!("{leg}_{side}_lower"));
             text += &(body(&upper, 0.1, 0.05, 1e-4) + &body(&lower, 0.12, 0.1, 4e-4));
-            text += &joint(&upper, "parent = \"trunk\"\n", "revolute", [x + dx, y, 0.0]);
-            text += &joint(&lower, &format!("parent = \"{upper}\"\n"), "revolute", [0.1, 0.0, 0.0]);
+            text += &revolute(&upper, "trunk", [x + dx, y, 0.0], [0, 1, 0]);
+            text += &revolute(&lower, &upper, [0.1, 0.0, 0.0], [0, 1, 0]);
             text += &format!("[[frame]]\nname = \"{lower}_end\"\nbody = \"{lower}\"\nxyz = [0.2, 0, 0]\n\n");
         }
         text += &format!(
             "[[loop]]\nname = \"{leg}_foot\"\ntype = \"revolute\"\nbetween = [\"{leg}_front_lower_end\", \
              \"{leg}_back_lower_end\"]\naxis = [0, 1, 0]\n\n"
+        );
+    }
+    text
+}
+
+/// A quadruped with legs of three joints, whose feet are pinned to the ground.
+fn pinned_feet() -> String {
+    let mut text = trunk("pinned_feet");
+    for (leg, [x, y]) in LEGS {
+        let [hip, upper, lower] = ["hip", "upper", "lower"].map(|part| format!("{leg}_{part}"));
+        text += &(body(&hip, 0.15, 0.0, 1e-4) + &body(&upper, 0.15, 0.05, 4e-4) + &body(&lower, 0.03, 0.05, 1e-4));
+        text += &revolute(&hip, "trunk", [x, y, 0.0], [1, 0, 0]);
+        let start = |joint: String, angle: f64| joint.trim_end().to_string() + &format!("\nstart = {angle}\n\n");
+        text += &start(revolute(&upper, &hip, [0.0, 0.02_f64.copysign(y), 0.0], [0, 1, 0]), 0.7);
+        text += &start(revolute(&lower, &upper, [0.16, 0.01, 0.0], [0, 1, 0]), 1.4);
+        text += &format!(
+            "[[frame]]\nname = \"{leg}_foot\"\nbody = \"{lower}\"\nxyz = [0.16, 0, 0]\n\n[[loop]]\nname = \"{leg}_pin\"\n\
+             type = \"spherical\"\nbetween = [\"ground\", \"{leg}_foot\"]\n\n"
         );
     }
     text

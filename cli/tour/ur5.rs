@@ -80,27 +80,19 @@ impl Ur5 {
     #[inline(always)]
     fn rates_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), qd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized), pd: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
+        for l in 0..LANES { angles[1][l] = q.get(4, l); }
+        for l in 0..LANES { angles[2][l] = q.get(5, l); }
         let mut read_0 = [0.0; LANES];
         let mut read_1 = [0.0; LANES];
-        let mut read_2 = [0.0; LANES];
-        let mut read_3 = [0.0; LANES];
-        let mut read_4 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES { read_1[l] = q.get(2, l); }
-        for l in 0..LANES { read_2[l] = q.get(3, l); }
-        for l in 0..LANES { read_3[l] = q.get(4, l); }
-        for l in 0..LANES { read_4[l] = q.get(5, l); }
+        for l in 0..LANES { read_0[l] = q.get(2, l); }
+        for l in 0..LANES { read_1[l] = q.get(3, l); }
         for l in 0..LANES {
-            let q_1 = read_0[l];
-            let q_2 = read_1[l];
-            let q_3 = read_2[l];
-            let q_4 = read_3[l];
-            let q_5 = read_4[l];
+            let q_1 = angles[0][l];
+            let q_2 = read_0[l];
+            let q_3 = read_1[l];
             let forearm_link_t0 = q_1 + q_2;
             let wrist_1_link_t0 = q_3 + forearm_link_t0;
-            angles[0][l] = q_1;
-            angles[1][l] = q_4;
-            angles[2][l] = q_5;
             angles[3][l] = forearm_link_t0;
             angles[4][l] = wrist_1_link_t0;
         }
@@ -496,27 +488,19 @@ impl Ur5 {
     #[inline(always)]
     fn velocities_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
+        for l in 0..LANES { angles[1][l] = q.get(4, l); }
+        for l in 0..LANES { angles[2][l] = q.get(5, l); }
         let mut read_0 = [0.0; LANES];
         let mut read_1 = [0.0; LANES];
-        let mut read_2 = [0.0; LANES];
-        let mut read_3 = [0.0; LANES];
-        let mut read_4 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES { read_1[l] = q.get(2, l); }
-        for l in 0..LANES { read_2[l] = q.get(3, l); }
-        for l in 0..LANES { read_3[l] = q.get(4, l); }
-        for l in 0..LANES { read_4[l] = q.get(5, l); }
+        for l in 0..LANES { read_0[l] = q.get(2, l); }
+        for l in 0..LANES { read_1[l] = q.get(3, l); }
         for l in 0..LANES {
-            let q_1 = read_0[l];
-            let q_2 = read_1[l];
-            let q_3 = read_2[l];
-            let q_4 = read_3[l];
-            let q_5 = read_4[l];
+            let q_1 = angles[0][l];
+            let q_2 = read_0[l];
+            let q_3 = read_1[l];
             let forearm_link_t0 = q_1 + q_2;
             let wrist_1_link_t0 = q_3 + forearm_link_t0;
-            angles[0][l] = q_1;
-            angles[1][l] = q_4;
-            angles[2][l] = q_5;
             angles[3][l] = forearm_link_t0;
             angles[4][l] = wrist_1_link_t0;
         }
@@ -771,27 +755,19 @@ impl Ur5 {
     #[inline(always)]
     fn momenta_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
+        for l in 0..LANES { angles[1][l] = q.get(4, l); }
+        for l in 0..LANES { angles[2][l] = q.get(5, l); }
         let mut read_0 = [0.0; LANES];
         let mut read_1 = [0.0; LANES];
-        let mut read_2 = [0.0; LANES];
-        let mut read_3 = [0.0; LANES];
-        let mut read_4 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES { read_1[l] = q.get(2, l); }
-        for l in 0..LANES { read_2[l] = q.get(3, l); }
-        for l in 0..LANES { read_3[l] = q.get(4, l); }
-        for l in 0..LANES { read_4[l] = q.get(5, l); }
+        for l in 0..LANES { read_0[l] = q.get(2, l); }
+        for l in 0..LANES { read_1[l] = q.get(3, l); }
         for l in 0..LANES {
-            let q_1 = read_0[l];
-            let q_2 = read_1[l];
-            let q_3 = read_2[l];
-            let q_4 = read_3[l];
-            let q_5 = read_4[l];
+            let q_1 = angles[0][l];
+            let q_2 = read_0[l];
+            let q_3 = read_1[l];
             let forearm_link_t0 = q_1 + q_2;
             let wrist_1_link_t0 = q_3 + forearm_link_t0;
-            angles[0][l] = q_1;
-            angles[1][l] = q_4;
-            angles[2][l] = q_5;
             angles[3][l] = forearm_link_t0;
             angles[4][l] = wrist_1_link_t0;
         }
@@ -988,27 +964,19 @@ impl Ur5 {
     #[inline(always)]
     fn energy_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), p: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), energy: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
+        for l in 0..LANES { angles[1][l] = q.get(4, l); }
+        for l in 0..LANES { angles[2][l] = q.get(5, l); }
         let mut read_0 = [0.0; LANES];
         let mut read_1 = [0.0; LANES];
-        let mut read_2 = [0.0; LANES];
-        let mut read_3 = [0.0; LANES];
-        let mut read_4 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES { read_1[l] = q.get(2, l); }
-        for l in 0..LANES { read_2[l] = q.get(3, l); }
-        for l in 0..LANES { read_3[l] = q.get(4, l); }
-        for l in 0..LANES { read_4[l] = q.get(5, l); }
+        for l in 0..LANES { read_0[l] = q.get(2, l); }
+        for l in 0..LANES { read_1[l] = q.get(3, l); }
         for l in 0..LANES {
-            let q_1 = read_0[l];
-            let q_2 = read_1[l];
-            let q_3 = read_2[l];
-            let q_4 = read_3[l];
-            let q_5 = read_4[l];
+            let q_1 = angles[0][l];
+            let q_2 = read_0[l];
+            let q_3 = read_1[l];
             let forearm_link_t0 = q_1 + q_2;
             let wrist_1_link_t0 = q_3 + forearm_link_t0;
-            angles[0][l] = q_1;
-            angles[1][l] = q_4;
-            angles[2][l] = q_5;
             angles[3][l] = forearm_link_t0;
             angles[4][l] = wrist_1_link_t0;
         }
@@ -1272,27 +1240,19 @@ impl Ur5 {
     #[inline(always)]
     fn accelerations_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
+        for l in 0..LANES { angles[1][l] = q.get(4, l); }
+        for l in 0..LANES { angles[2][l] = q.get(5, l); }
         let mut read_0 = [0.0; LANES];
         let mut read_1 = [0.0; LANES];
-        let mut read_2 = [0.0; LANES];
-        let mut read_3 = [0.0; LANES];
-        let mut read_4 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES { read_1[l] = q.get(2, l); }
-        for l in 0..LANES { read_2[l] = q.get(3, l); }
-        for l in 0..LANES { read_3[l] = q.get(4, l); }
-        for l in 0..LANES { read_4[l] = q.get(5, l); }
+        for l in 0..LANES { read_0[l] = q.get(2, l); }
+        for l in 0..LANES { read_1[l] = q.get(3, l); }
         for l in 0..LANES {
-            let q_1 = read_0[l];
-            let q_2 = read_1[l];
-            let q_3 = read_2[l];
-            let q_4 = read_3[l];
-            let q_5 = read_4[l];
+            let q_1 = angles[0][l];
+            let q_2 = read_0[l];
+            let q_3 = read_1[l];
             let forearm_link_t0 = q_1 + q_2;
             let wrist_1_link_t0 = q_3 + forearm_link_t0;
-            angles[0][l] = q_1;
-            angles[1][l] = q_4;
-            angles[2][l] = q_5;
             angles[3][l] = forearm_link_t0;
             angles[4][l] = wrist_1_link_t0;
         }
@@ -1755,27 +1715,19 @@ impl Ur5 {
     #[inline(always)]
     fn mass_matrix_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), m: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
+        for l in 0..LANES { angles[1][l] = q.get(4, l); }
+        for l in 0..LANES { angles[2][l] = q.get(5, l); }
         let mut read_0 = [0.0; LANES];
         let mut read_1 = [0.0; LANES];
-        let mut read_2 = [0.0; LANES];
-        let mut read_3 = [0.0; LANES];
-        let mut read_4 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES { read_1[l] = q.get(2, l); }
-        for l in 0..LANES { read_2[l] = q.get(3, l); }
-        for l in 0..LANES { read_3[l] = q.get(4, l); }
-        for l in 0..LANES { read_4[l] = q.get(5, l); }
+        for l in 0..LANES { read_0[l] = q.get(2, l); }
+        for l in 0..LANES { read_1[l] = q.get(3, l); }
         for l in 0..LANES {
-            let q_1 = read_0[l];
-            let q_2 = read_1[l];
-            let q_3 = read_2[l];
-            let q_4 = read_3[l];
-            let q_5 = read_4[l];
+            let q_1 = angles[0][l];
+            let q_2 = read_0[l];
+            let q_3 = read_1[l];
             let forearm_link_t0 = q_1 + q_2;
             let wrist_1_link_t0 = q_3 + forearm_link_t0;
-            angles[0][l] = q_1;
-            angles[1][l] = q_4;
-            angles[2][l] = q_5;
             angles[3][l] = forearm_link_t0;
             angles[4][l] = wrist_1_link_t0;
         }
@@ -1996,27 +1948,19 @@ impl Ur5 {
     #[inline(always)]
     fn inverse_dynamics_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), a: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), tau: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
+        for l in 0..LANES { angles[1][l] = q.get(4, l); }
+        for l in 0..LANES { angles[2][l] = q.get(5, l); }
         let mut read_0 = [0.0; LANES];
         let mut read_1 = [0.0; LANES];
-        let mut read_2 = [0.0; LANES];
-        let mut read_3 = [0.0; LANES];
-        let mut read_4 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES { read_1[l] = q.get(2, l); }
-        for l in 0..LANES { read_2[l] = q.get(3, l); }
-        for l in 0..LANES { read_3[l] = q.get(4, l); }
-        for l in 0..LANES { read_4[l] = q.get(5, l); }
+        for l in 0..LANES { read_0[l] = q.get(2, l); }
+        for l in 0..LANES { read_1[l] = q.get(3, l); }
         for l in 0..LANES {
-            let q_1 = read_0[l];
-            let q_2 = read_1[l];
-            let q_3 = read_2[l];
-            let q_4 = read_3[l];
-            let q_5 = read_4[l];
+            let q_1 = angles[0][l];
+            let q_2 = read_0[l];
+            let q_3 = read_1[l];
             let forearm_link_t0 = q_1 + q_2;
             let wrist_1_link_t0 = q_3 + forearm_link_t0;
-            angles[0][l] = q_1;
-            angles[1][l] = q_4;
-            angles[2][l] = q_5;
             angles[3][l] = forearm_link_t0;
             angles[4][l] = wrist_1_link_t0;
         }
@@ -2364,27 +2308,19 @@ impl Ur5 {
     #[inline(always)]
     fn bias_kernel<A: ::multibody::runtime::kernel::Arithmetic, const LANES: usize>(q: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), v: &(impl ::multibody::runtime::kernel::Read<f64> + ?Sized), h: &mut (impl ::multibody::runtime::kernel::Write<f64> + ?Sized)) {
         let mut angles = ::multibody::runtime::kernel::Rows([[0.0; LANES]; 5]);
+        for l in 0..LANES { angles[0][l] = q.get(1, l); }
+        for l in 0..LANES { angles[1][l] = q.get(4, l); }
+        for l in 0..LANES { angles[2][l] = q.get(5, l); }
         let mut read_0 = [0.0; LANES];
         let mut read_1 = [0.0; LANES];
-        let mut read_2 = [0.0; LANES];
-        let mut read_3 = [0.0; LANES];
-        let mut read_4 = [0.0; LANES];
-        for l in 0..LANES { read_0[l] = q.get(1, l); }
-        for l in 0..LANES { read_1[l] = q.get(2, l); }
-        for l in 0..LANES { read_2[l] = q.get(3, l); }
-        for l in 0..LANES { read_3[l] = q.get(4, l); }
-        for l in 0..LANES { read_4[l] = q.get(5, l); }
+        for l in 0..LANES { read_0[l] = q.get(2, l); }
+        for l in 0..LANES { read_1[l] = q.get(3, l); }
         for l in 0..LANES {
-            let q_1 = read_0[l];
-            let q_2 = read_1[l];
-            let q_3 = read_2[l];
-            let q_4 = read_3[l];
-            let q_5 = read_4[l];
+            let q_1 = angles[0][l];
+            let q_2 = read_0[l];
+            let q_3 = read_1[l];
             let forearm_link_t0 = q_1 + q_2;
             let wrist_1_link_t0 = q_3 + forearm_link_t0;
-            angles[0][l] = q_1;
-            angles[1][l] = q_4;
-            angles[2][l] = q_5;
             angles[3][l] = forearm_link_t0;
             angles[4][l] = wrist_1_link_t0;
         }

@@ -102,6 +102,8 @@ pub struct SetPrograms {
     pub plan: Plan,
     /// Programs of outputs.
     pub outputs: Vec<OutputProgram<Code>>,
+    /// Those that compute like branches together, by the names of their outputs.
+    pub together: Vec<(&'static str, RolledProgram, Vectors)>,
 }
 
 impl Programs {
@@ -170,15 +172,20 @@ impl Programs {
             let wanted = OF_EACH_SET.into_iter().filter(|output| options.outputs.contains(output));
             let cheaper = |output| {
                 let first = compile(&plan, output, options)?;
-                let second = other.as_ref().map(|other| compile(other, output, options)).transpose()?;
+                let second = other.as_ref().map(|other| Ok((other, compile(other, output, options)?))).transpose()?;
                 let total = |of: &OutputProgram<Code>| of.program.counts().total();
                 Ok(match second {
-                    Some(second) if total(&second) < total(&first) => second,
-                    _ => first,
+                    Some((other, second)) if total(&second) < total(&first) => (other, second),
+                    _ => (&plan, first),
                 })
             };
-            let outputs = wanted.map(cheaper).collect::<Result<_, _>>()?;
-            programs.sets.push(SetPrograms { modes, plan, outputs });
+            let (mut outputs, mut together) = (Vec::new(), Vec::new());
+            for output in wanted {
+                let (plan, mut program): (&Plan, _) = cheaper(output)?;
+                together.extend(like_branches(plan, output, &mut program, options));
+                outputs.push(program);
+            }
+            programs.sets.push(SetPrograms { modes, plan, outputs, together });
         }
         Ok(programs)
     }
@@ -188,13 +195,7 @@ impl Programs {
     #[must_use]
     pub fn with_like_branches(mut self, plan: &Plan, options: &Options) -> Programs {
         for (output, program) in options.outputs.iter().zip(&mut self.outputs) {
-            let Code::Straight(straight) = &mut program.program else { continue };
-            let Some(both) = together(plan, *output, options) else { continue };
-            let Some(vectors) = both.program.pays(straight, options) else { continue };
-            if options.arithmetic == Arithmetic::Fast {
-                *straight = both.program.apart;
-            }
-            self.together.push((output.name(), both.program.program, vectors));
+            self.together.extend(like_branches(plan, *output, program, options));
         }
         self
     }
@@ -217,6 +218,23 @@ impl Programs {
         let of = |output: &Output| self.outputs.iter().find(|p| p.spec.name == output.name());
         options.outputs.iter().filter_map(|output| Some((*output, of(output)?.program.counts()))).collect()
     }
+}
+
+/// The program that computes like branches together for one state, with the name of its output, where that is faster than the
+/// straight-line one, which then gets the same statements.
+fn like_branches(
+    plan: &Plan,
+    output: Output,
+    program: &mut OutputProgram<Code>,
+    options: &Options,
+) -> Option<(&'static str, RolledProgram, Vectors)> {
+    let Code::Straight(straight) = &mut program.program else { return None };
+    let both = together(plan, output, options)?;
+    let vectors = both.program.pays(straight, options)?;
+    if options.arithmetic == Arithmetic::Fast {
+        *straight = both.program.apart;
+    }
+    Some((output.name(), both.program.program, vectors))
 }
 
 /// The program of an output.

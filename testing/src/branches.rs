@@ -114,6 +114,44 @@ pub fn with_loops(seed: u64, numbers: Numbers, on: On) -> Model {
     read::model("loops.toml", &text, &options).unwrap_or_else(|findings| panic!("{findings}\n{text}")).model
 }
 
+/// A floating body on two to five like legs, whose feet constraints bind to the ground: points, points on planes, or points that
+/// keep a distance and have a frame of their own on the ground.
+///
+/// # Panics
+/// If the reader refuses the text.
+pub fn on_feet(seed: u64, numbers: Numbers) -> Model {
+    let mut rng = Rng::new(seed, 5);
+    let mut text =
+        "name = \"on_feet\"\ngravity = [0, 0, -9.81]\n\n[[body]]\nname = \"trunk\"\nmass = 5.0\ncom = [0.1, 0, \
+                    0.02]\ninertia = [0.2, 0.3, 0.4]\n\n[[joint]]\nname = \"base\"\ntype = \"floating\"\nchild = \
+                    \"trunk\"\n\n"
+            .to_string();
+    let legs = 2 + rng.below(4);
+    let kind = rng.pick(&["spherical", "point_on_plane", "distance"]);
+    let decay = if rng.chance(0.5) { "decay = 5\n" } else { "" };
+    for leg in 0..legs {
+        let (mut own, scale) = of_branch(seed, leg, numbers);
+        let names = [format!("hip{leg}"), format!("knee{leg}")];
+        body(&mut text, &names[0], "trunk", "universal", &mut own, scale);
+        body(&mut text, &names[1], &names[0], "revolute", &mut own, scale);
+        let size = 0.4 + own.around(0.1);
+        let number = match kind {
+            "distance" => format!("length = {size}\n"),
+            "point_on_plane" => "normal = [0.1, 0.2, 1]\n".to_string(),
+            _ => String::new(),
+        };
+        let _ = writeln!(
+            text,
+            "[[frame]]\nname = \"foot{leg}\"\nbody = \"{}\"\nxyz = [{size}, 0.1, 0]\n\n[[frame]]\nname = \
+             \"print{leg}\"\nbody = \"ground\"\nxyz = [{size}, {leg}, 0.1]\nrpy = [0.3, 0.1, 0.2]\n\n[[loop]]\nname = \"pin{leg}\"\ntype = \
+             \"{kind}\"\nbetween = [\"print{leg}\", \"foot{leg}\"]\n{number}{decay}",
+            names[1]
+        );
+    }
+    let options = ImportOptions::default();
+    read::model("on_feet.toml", &text, &options).unwrap_or_else(|findings| panic!("{findings}\n{text}")).model
+}
+
 /// The random numbers of a branch, and factors of its vectors.
 fn of_branch(seed: u64, branch: usize, numbers: Numbers) -> (Rng, [f64; 3]) {
     let own = match numbers {

@@ -102,15 +102,7 @@ pub fn source(input: &Input) -> String {
         if let (Some(contacts), true) = (&contacts, function.first) {
             contacts.dispatch(&mut out, &Signature::new(program.spec, &programs.sizes));
         }
-        let together = programs.together.iter().find(|(name, ..)| *name == kernel.signature.name);
-        write_function(
-            &mut out,
-            function.plan,
-            options,
-            program,
-            together.map(|(_, program, vectors)| (program, *vectors)),
-            kernel,
-        );
+        write_function(&mut out, function.plan, options, program, function.together(), kernel);
     }
     // Several states would have to be in the same modes of contacts.
     let lanes = contacts.is_none();
@@ -153,9 +145,18 @@ struct Function<'a> {
     part: Option<String>,
     /// Whether it is the first part of its output.
     first: bool,
+    /// Programs that compute like branches together, by the names of outputs: its own may be among them.
+    together: &'a [(&'static str, RolledProgram, Vectors)],
 }
 
-impl Function<'_> {
+impl<'a> Function<'a> {
+    /// The program that computes like branches together for one state.
+    fn together(&self) -> Option<(&'a RolledProgram, Vectors)> {
+        let Kind::Whole(program) = &self.program else { return None };
+        let own = self.together.iter().find(|(name, ..)| *name == program.spec.name);
+        own.map(|(_, program, vectors)| (program, *vectors))
+    }
+
     fn signature(&self, sizes: &Sizes) -> Signature {
         let spec = match &self.program {
             Kind::Whole(program) => program.spec,
@@ -192,7 +193,7 @@ fn functions<'a>(Input { plan, programs, .. }: &Input<'a>, contacts: Option<&Con
     for program in programs.functions() {
         let part = contacts.and_then(|contacts| contacts.for_all_modes(program.spec.name));
         let first = part.is_some();
-        functions.push(Function { program: Kind::Whole(program), plan, part, first });
+        functions.push(Function { program: Kind::Whole(program), plan, part, first, together: &programs.together });
     }
     #[cfg(feature = "factored")]
     functions.extend(programs.factored.iter().map(|program| Function {
@@ -200,11 +201,12 @@ fn functions<'a>(Input { plan, programs, .. }: &Input<'a>, contacts: Option<&Con
         plan,
         part: None,
         first: false,
+        together: &[],
     }));
     for (k, set) in programs.sets.iter().enumerate() {
         functions.extend(set.outputs.iter().map(|program| {
             let part = Some(Contacts::for_set(program.spec.name, k));
-            Function { program: Kind::Whole(program), plan: &set.plan, part, first: false }
+            Function { program: Kind::Whole(program), plan: &set.plan, part, first: false, together: &set.together }
         }));
     }
     functions

@@ -140,29 +140,56 @@ impl<'a> Straight<'a> {
             return;
         }
         let _ = writeln!(out, "        let mut angles = {};", self.head.rows(n));
-        // No vectors are made of a loop whose inputs may overlap with what it writes. In one array, its rows are free until the
-        // inputs of the other loop are copied.
-        let read: Vec<(u32, u32)> = self.given_of(&self.angles.before).collect();
-        let copied = if !self.in_one_array() {
-            self.head.locals(out, "        ", "read", read.len());
-            self.write_copies(out, "read", read.into_iter())
-        } else if read.len() <= self.locations() {
-            self.write_copies(out, "read", read.into_iter())
-        } else {
-            BTreeMap::new()
-        };
-        let _ = writeln!(out, "        for l in 0..LANES {{");
-        self.write_steps(out, &self.angles.before, &copied, false);
-        for (k, angle) in self.angles.early.keys().enumerate() {
-            let _ = writeln!(out, "            angles[{k}][l] = {};", self.names[angle]);
+        let mut copied = self.write_plain_angles(out);
+        let composite: Vec<(usize, u32)> =
+            self.angles.early.keys().copied().enumerate().filter(|(_, angle)| !copied.contains_key(angle)).collect();
+        if !composite.is_empty() {
+            let steps = self.needed_for(composite.iter().map(|(_, angle)| *angle).collect());
+            // No vectors are made of a loop whose inputs may overlap with what it writes. In one array, its rows are free until the
+            // inputs of the other loop are copied.
+            let read: Vec<(u32, u32)> = self.given_of(&steps).filter(|(id, _)| !copied.contains_key(id)).collect();
+            if !self.in_one_array() {
+                self.head.locals(out, "        ", "read", read.len());
+            }
+            if !self.in_one_array() || read.len() <= self.locations() {
+                copied.extend(self.write_copies(out, "read", read.into_iter()));
+            }
+            let _ = writeln!(out, "        for l in 0..LANES {{");
+            self.write_steps(out, &steps, &copied, false);
+            for (k, angle) in composite {
+                let _ = writeln!(out, "            angles[{k}][l] = {};", self.names[&angle]);
+            }
+            let _ = writeln!(out, "        }}");
         }
-        let _ = writeln!(out, "        }}");
         let _ = writeln!(out, "        let (sines, cosines) = {};", self.head.sines_and_cosines("angles", n));
         if self.in_one_array() {
             for (name, k) in ["sines", "cosines"].into_iter().flat_map(|name| (0..n).map(move |k| (name, k))) {
                 let _ = writeln!(out, "        {} = {name}[{k}];", self.row_of_angle(name, k));
             }
         }
+    }
+
+    /// Copies inputs that are angles to the rows of these, and tells which.
+    fn write_plain_angles(&self, out: &mut String) -> BTreeMap<u32, String> {
+        let inputs: BTreeMap<u32, u32> = self.given_of(&self.angles.before).collect();
+        let mut copied = BTreeMap::new();
+        for (k, angle) in self.angles.early.keys().enumerate() {
+            let Some(input) = inputs.get(angle) else { continue };
+            let from = self.head.input(*input as usize, "", "l");
+            let _ = writeln!(out, "        for l in 0..LANES {{ angles[{k}][l] = {from}; }}");
+            copied.insert(*angle, format!("angles[{k}]"));
+        }
+        copied
+    }
+
+    /// Some steps, and those before the sines that they use.
+    fn needed_for(&self, mut steps: BTreeSet<u32>) -> BTreeSet<u32> {
+        for (id, op, _) in self.program.steps.iter().rev() {
+            if steps.contains(id) {
+                steps.extend(nodes(op));
+            }
+        }
+        steps
     }
 
     /// Those of the program's steps that are in a set, in order. Many statements are written in blocks that return the

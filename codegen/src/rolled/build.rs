@@ -3,7 +3,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mbd_runtime::tree::{Source, Tree, Unknown};
+use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Source, Tree, TreeFrame, Unknown};
+use mbd_runtime::Scalar;
 
 use super::link::Link;
 use super::main_line::{Event, MainLine};
@@ -15,7 +16,7 @@ use crate::options::Options;
 use crate::output::{Dim, InputArray, Output, OutputProgram};
 use crate::plan::Plan;
 use crate::symbolic::{passes, Expr, Graph, Op, Operand, ProgramResult};
-use crate::trace::{rewrite, sizes, tolerance, SymbolicInputs};
+use crate::trace::{rewrite, sizes, symbolic_tree, SymbolicInputs};
 
 /// Builds the loop form with the runs that `find` finds among the nodes that are allowed; `None` where there are none.
 pub fn build(
@@ -26,10 +27,9 @@ pub fn build(
 ) -> Option<OutputProgram<RolledProgram>> {
     let sweeps = OutputSweeps::of(group)?;
     let graph = Graph::default();
-    let given = SymbolicInputs::new(&graph, plan, group.spec(), options);
-    let mut tree: Tree<Expr> = plan.tree(&given.params);
-    tree.tolerance = Expr::Const(tolerance(options.precision));
-    let tree = tree.regrouped();
+    let spec = if plan.early_tolerance.is_some() { group.with_early_rows() } else { group.spec() };
+    let given = SymbolicInputs::new(&graph, plan, spec, options);
+    let tree = symbolic_tree(plan, group, &given, options).regrouped();
     let (plan_of_tree, tree) = match (group, &plan.accelerations) {
         (Output::Accelerations, Some(other)) => (&**other, tree.for_accelerations().clone()),
         _ => (plan, tree),
@@ -60,7 +60,10 @@ pub fn build(
     if (group == Output::Energy || line.unfit) && runs.iter().any(|run| run.branches.is_some()) {
         return None;
     }
-    let results = line.stage.finish(&line.given);
+    let mut results = line.stage.finish(&line.given);
+    if plan.early_tolerance.is_some() {
+        results.push(line.early_rows_act()?);
+    }
     let own: Vec<Vec<(Expr, Target)>> = links
         .iter_mut()
         .zip(starts.iter().zip(&runs))
@@ -68,7 +71,7 @@ pub fn build(
         .collect();
     let mut build = Build { line: &line, graphs: &graphs, links: &links, starts: &starts, own, results };
     let program = build.program(options);
-    Some(OutputProgram { spec: group.spec(), inputs: line.given.arrays, program })
+    Some(OutputProgram { spec, inputs: line.given.arrays, program })
 }
 
 /// The tree without the constraints inside of branches, and without columns of their unknowns, which nothing else asks for.
@@ -81,7 +84,12 @@ fn without_inner<'g>(mut tree: Tree<Expr<'g>>, runs: &[Run]) -> Tree<Expr<'g>> {
             };
             let (first, stride, size) = (branches.first, branches.stride, branches.size);
             let rows = |row: usize| within(row, first.rows, stride.rows, size.rows);
-            tree.constraints.retain(|c| !rows(c.first));
+            // All branches hang on the same path from the ground.
+            let without = |c: Constraint<Expr<'g>>| match rows(c.first) {
+                true => to_ground(c).filter(|_| turn == 0 && branches.parent.is_some()),
+                false => Some(c),
+            };
+            tree.constraints = std::mem::take(&mut tree.constraints).into_iter().filter_map(without).collect();
             // What is solved at the ground in the branches meets nothing else there.
             let outer = |g: usize| match tree.unknowns[g] {
                 Unknown::Row(row) => !rows(row),
@@ -92,6 +100,18 @@ fn without_inner<'g>(mut tree: Tree<Expr<'g>>, runs: &[Run]) -> Tree<Expr<'g>> {
         }
     }
     tree
+}
+
+/// What the rest of the tree needs of a constraint that binds a branch to the ground: the way from there to the branch, of which
+/// the branch takes in the pose, and along which it hands wrenches on. `None` for other constraints.
+fn to_ground(constraint: Constraint<Expr>) -> Option<Constraint<Expr>> {
+    let Bond::Cut(cut) = constraint.bond else { return None };
+    let nowhere = || TreeFrame { node: None, place: Vec::new() };
+    let bond = Bond::Cut(Cut { closure: Closure::Fixed, a: nowhere(), b: nowhere(), ..cut });
+    // Nothing is known of its rows, as if they were to decay.
+    let decay = Some(Expr::zero());
+    let constraint = Constraint { bond, slots: Vec::new(), passes: Vec::new(), decay, ..constraint };
+    cut.grounded.then_some(constraint)
 }
 
 /// First coordinate, velocity and row of a run.

@@ -3,16 +3,14 @@
 
 use std::collections::BTreeMap;
 
-use mbd_runtime::spatial::RigidInertia;
 use mbd_runtime::sweep::pass::Pass;
-use mbd_runtime::tree::{
-    Bond, Closure, Constraint, Cut, Dims, Elimination, Kind, Node, Passive, Source, Tree, TreeFrame, Unknown,
-};
+use mbd_runtime::tree::{Source, Tree};
 use mbd_runtime::Scalar;
 
 use super::pass_state::{read, PassState};
-use super::runs::{map_constraint, map_node, Extent, Run, Slot};
+use super::runs::{Extent, Run, Slot};
 use super::turn_constants::constant;
+use super::turn_tree::{size_of, turn_tree};
 use super::twins::{signed, value, Twin, Twins};
 use super::SweepDirection;
 use crate::output::Output;
@@ -88,33 +86,15 @@ impl<'g, 'a> Link<'g, 'a> {
             Slot::Const(x) => Expr::Const(x),
             Slot::Column(c) => columns[c],
         };
-        let (mut nq, mut nv) = (0, 0);
-        let mut nodes = match &run.branches {
-            Some(branches) if branches.parent.is_none() => Vec::new(),
-            branches => vec![dummy(branches.as_ref().is_some_and(|b| b.accumulates))],
-        };
-        if let Some(branches) = run.branches.as_ref().filter(|b| b.parent.is_some() && !b.solve_last.is_empty()) {
-            nodes.push(solver(branches.solve_last.clone()));
-        }
-        for (k, node) in run.template.iter().enumerate() {
-            let mut node = map_node(node, &mut slot);
-            if run.branches.is_none() {
-                node.parent = Some(k);
-                node.source = Source::State { q: nq, v: nv };
-                (nq, nv) = (nq + node.kind.nq(), nv + node.kind.nv());
-            }
-            nodes.push(node);
-        }
-        let own = Extent { q: nq, v: nv, rows: 0 };
-        let (size, stride) = run.branches.as_ref().map_or((own, own), |b| (b.size, b.stride));
-        (nq, nv) = (size.q, size.v);
+        let size = size_of(run);
+        let stride = run.branches.as_ref().map_or(size, |b| b.stride);
         let zero = Expr::zero();
         let given = SymbolicInputs {
             arrays: Vec::new(),
-            q: symbols(&LinkInput::Q, nq),
-            second: symbols(&LinkInput::Second, nv),
-            third: symbols(&LinkInput::Third, if group.spec().inputs.len() > 2 { nv } else { 0 }),
-            tau: symbols(&LinkInput::Tau, if efforts { nv } else { 0 }),
+            q: symbols(&LinkInput::Q, size.q),
+            second: symbols(&LinkInput::Second, size.v),
+            third: symbols(&LinkInput::Third, if group.spec().inputs.len() > 2 { size.v } else { 0 }),
+            tau: symbols(&LinkInput::Tau, if efforts { size.v } else { 0 }),
             // The node at which rows are solved stands still by these; nothing reads them for the dummy.
             drive: [vec![zero; 3], vec![zero; 3], vec![zero; 3]],
             wrenches: Vec::new(),
@@ -122,44 +102,11 @@ impl<'g, 'a> Link<'g, 'a> {
             gravity: [zero; 3],
             acts: Vec::new(),
         };
-        let constraints: Vec<Constraint<Expr<'g>>> = match run.branches {
-            Some(_) => run.constraints.iter().map(|c| map_constraint(c, &mut slot)).collect(),
-            None => tree.constraints.iter().map(|c| stand_in(c, run)).collect(),
-        };
-        // In a chain, numbered as in the tree; coordinates are open nowhere in it.
-        let row = |shared: &Unknown| if let Unknown::Row(_) = shared { *shared } else { Unknown::Row(0) };
-        let (rows, shared, solve_at_ground) = match &run.branches {
-            Some(branches) => {
-                let last = if branches.parent.is_none() { branches.solve_last.clone() } else { Vec::new() };
-                (size.rows, branches.unknowns.clone(), last)
-            }
-            None if constraints.is_empty() => (tree.dims.rows, Vec::new(), Vec::new()),
-            None => (tree.dims.rows, tree.unknowns.iter().map(row).collect(), Vec::new()),
-        };
-        let dims = Dims { nq, nv, rows, drive_q: 3, drive_v: 3, ..Dims::default() };
-        let count =
-            nodes.len() - nodes.first().map_or(0, |node| usize::from(matches!(node.source, Source::Drive { .. })));
-        let tree = Tree {
-            nodes,
-            dims,
-            unknowns: shared,
-            solve_at_ground,
-            ground_moment: [zero; 3],
-            wrenches: Vec::new(),
-            constraints,
-            tolerance: match tree.tolerance {
-                Expr::Const(x) => Expr::Const(x),
-                Expr::Node { .. } => Expr::rank_tolerance(),
-            },
-            early_tolerance: tree.early_tolerance,
-            row_factors: None,
-            frames: Vec::new(),
-            joint_nodes: Vec::new(),
-            accelerations: None,
-            matrix_depth: 0,
-        };
+        let tree = turn_tree(run, size, tree, &mut slot);
+        let stand_in = tree.nodes.first().is_some_and(|node| matches!(node.source, Source::Drive { .. }));
+        let nodes = tree.nodes.len() - usize::from(stand_in);
         let stage = PassState::new(group, graph, tree, passes)?;
-        Some(Link { graph, stage, given, nodes: count, inputs, passes: Vec::new(), size, stride })
+        Some(Link { graph, stage, given, nodes, inputs, passes: Vec::new(), size, stride })
     }
 
     /// A pass, carrying in `first` at its first turn. What is constant there and stays so from turn to turn is a
@@ -252,8 +199,9 @@ impl<'g, 'a> Link<'g, 'a> {
     }
 
     /// A pass through a branch: outward with what the parent hands to all branches, inward with what each hands to the
-    /// parent. `keys` tell which numbers these are, as [`PassState::carried_by_sweeps`] gives them. `None`: a branch hands on
-    /// others.
+    /// parent. `keys` tell which numbers these are, as [`PassState::carried_by_sweeps`] gives them; further numbers from the
+    /// parent are those of [`PassState::poses_on_paths`], and gravity. Inward, where contacts have early rows, one more
+    /// tells whether all of them act. `None`: a branch hands on others.
     pub fn pass_of_branch(
         &mut self,
         pass: usize,
@@ -263,6 +211,10 @@ impl<'g, 'a> Link<'g, 'a> {
         let number = self.passes.len();
         self.stage.begin(pass, &self.given);
         let incoming = self.taken_in(number, from_parent);
+        if let Some((poses, gravity)) = incoming.get(keys.len()..).and_then(<[_]>::split_last_chunk) {
+            self.stage.poses_on_paths(|_| true).into_iter().zip(poses).for_each(|(e, pose)| *e = *pose);
+            self.given.gravity = *gravity;
+        }
         let mut all = BTreeMap::new();
         let (given, outer) = (&self.given, self.nodes);
         match direction {
@@ -285,10 +237,18 @@ impl<'g, 'a> Link<'g, 'a> {
             }
         }
         let inward = if direction == SweepDirection::TipToBase { keys } else { &[] };
-        let outgoing: Vec<Expr<'g>> = inward.iter().map(|key| all.remove(key)).collect::<Option<_>>()?;
+        // A sweep that other branches need may have nothing to do in this one.
+        let idle = |sweep: usize| !all.keys().any(|key| key[0] == sweep);
+        let nothing: BTreeMap<[usize; 2], Expr<'g>> =
+            inward.iter().filter(|key| idle(key[0])).map(|key| (*key, Expr::zero())).collect();
+        all.extend(nothing);
+        let mut outgoing: Vec<Expr<'g>> = inward.iter().map(|key| all.remove(key)).collect::<Option<_>>()?;
         // Columns of rows that are solved in the branch stay in it.
         if !all.values().all(|e| matches!(e, Expr::Const(x) if *x == 0.0)) {
             return None;
+        }
+        if direction == SweepDirection::TipToBase && self.stage.tree.early_tolerance.is_some() {
+            outgoing.push(self.stage.early_rows_act());
         }
         let negative: Vec<bool> = outgoing.iter().map(|e| matches!(e, Expr::Node { neg: true, .. })).collect();
         let outgoing = symbols_of(&outgoing);
@@ -349,57 +309,4 @@ fn symbols_of<'g>(incoming: &[Expr<'g>]) -> Vec<Expr<'g>> {
         Expr::Const(x) => Expr::Const(x),
     });
     plain.collect()
-}
-
-/// A constraint as a turn sees it: on the path to a frame if all of the run is.
-fn stand_in<'g>(constraint: &Constraint<Expr<'_>>, run: &Run) -> Constraint<Expr<'g>> {
-    let on_path = |path: &[usize]| match path.contains(&run.nodes.start) {
-        true => (1..=run.period).collect(),
-        false => Vec::new(),
-    };
-    let [path_a, path_b] = match &constraint.bond {
-        Bond::Cut(cut) => [on_path(&cut.path_a), on_path(&cut.path_b)],
-        Bond::Coupling { .. } => [Vec::new(), Vec::new()],
-    };
-    let grounded = matches!(&constraint.bond, Bond::Cut(cut) if cut.grounded);
-    let nowhere = || TreeFrame { node: None, place: Vec::new() };
-    Constraint {
-        bond: Bond::Cut(Cut { closure: Closure::Fixed, a: nowhere(), b: nowhere(), path_a, path_b, grounded }),
-        slots: constraint.slots.clone(),
-        passes: Vec::new(),
-        first: constraint.first,
-        entry: constraint.entry,
-        decay: None,
-        compliance: None,
-        own_axes: false,
-        velocities: Vec::new(),
-    }
-}
-
-/// A node without inertia and motion, at which rows are solved that bind branches of one node to one another, or to that node: it
-/// stands between them and the node.
-fn solver<'g>(rows: Vec<usize>) -> Node<Expr<'g>> {
-    let zero = Expr::zero();
-    let none = Passive { damping: zero, stiffness: zero, rest: zero, armature: zero };
-    let elimination = Elimination { solve_before: rows, ..Elimination::default() };
-    Node { parent: Some(0), passive: vec![none; 3], elimination, ..dummy(false) }
-}
-
-/// Stands for whatever is inboard of a turn: has no inertia, and is never stepped.
-fn dummy<'g>(accumulates_momentum: bool) -> Node<Expr<'g>> {
-    Node {
-        parent: None,
-        place: Vec::new(),
-        kind: Kind::Planar,
-        source: Source::Drive { q: 0, v: 0 },
-        ratio: Expr::one(),
-        offset: Expr::zero(),
-        phase: Expr::zero(),
-        quarter: 0,
-        slide: Expr::zero(),
-        slides: false,
-        inertia: RigidInertia::zero(),
-        passive: Vec::new(),
-        elimination: Elimination { accumulates_momentum, ..Elimination::default() },
-    }
 }

@@ -1,5 +1,7 @@
 //! The tree without the turns of its runs, taken through the passes: what is left is straight-line code between loops.
 
+use mbd_runtime::tree::Constraint;
+
 use super::link::Link;
 use super::pass_state::{read, PassState};
 use super::runs::Run;
@@ -200,6 +202,32 @@ impl<'m> MainLine<'m, '_> {
         (pass == self.last).then_some(Event { at, run: k, pass: 0, direction, start, end: Vec::new(), handed })
     }
 
+    /// Whether all early rows act, as [`PassState::early_rows_act`] tells of the rest of the tree and of each branch, which hands it to
+    /// its parent in the last pass from tip to base. `None` where that is the ground.
+    pub fn early_rows_act(&self) -> Option<Expr<'m>> {
+        let mut all = self.stage.early_rows_act();
+        for k in 0..self.runs.len() {
+            let inward = |event: &&Event| event.run == k && event.direction == SweepDirection::TipToBase;
+            for handed in &self.events.iter().rev().find(inward)?.handed {
+                all = all * *handed.last()?;
+            }
+        }
+        Some(all)
+    }
+
+    /// What the branches of a run take in besides what their parent hands to them: if constraints bind them to the ground, the poses
+    /// on the paths from there, and gravity.
+    fn from_ground(&mut self, k: usize) -> Vec<Expr<'m>> {
+        let Some(branches) = &self.runs[k].branches else { return Vec::new() };
+        let rows = branches.first.rows..branches.first.rows + branches.size.rows;
+        let stub = |c: &Constraint<Expr>| c.slots.is_empty() && rows.contains(&c.first);
+        let mut all: Vec<Expr<'m>> = self.stage.poses_on_paths(stub).into_iter().map(|e| *e).collect();
+        if !all.is_empty() {
+            all.extend(self.given.gravity);
+        }
+        all
+    }
+
     fn branches(
         &mut self,
         (k, parent): (usize, usize),
@@ -212,8 +240,9 @@ impl<'m> MainLine<'m, '_> {
             keys.push(key);
             start.push(*e);
         });
-        if direction == SweepDirection::TipToBase {
-            start.clear();
+        match direction {
+            SweepDirection::TipToBase => start.clear(),
+            SweepDirection::BaseToTip => start.extend(self.from_ground(k)),
         }
         let given: usize = self.given.arrays.iter().map(InputArray::len).sum();
         self.unfit |= start.iter().any(|e| match *e {

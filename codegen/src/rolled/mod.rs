@@ -18,6 +18,7 @@ mod siblings;
 mod sines;
 mod together;
 mod turn_constants;
+mod turn_tree;
 mod twins;
 
 use std::collections::BTreeSet;

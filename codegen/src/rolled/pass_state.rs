@@ -3,7 +3,7 @@
 
 use mbd_runtime::sweep::pass::{Arguments, Context, Pass, Results, Sweep, SweepList};
 use mbd_runtime::sweep::{Accelerations, Sweeps};
-use mbd_runtime::tree::Tree;
+use mbd_runtime::tree::{Bond, Constraint, Tree};
 use mbd_runtime::workspace::Workspace;
 use mbd_runtime::Scalar;
 
@@ -182,7 +182,14 @@ impl<'g, 'a> PassState<'g, 'a> {
         self.each(pass, given, |sweep, cx| (sweep.running)(cx, &mut visit));
     }
 
-    #[cfg(feature = "factored")]
+    /// The poses that have been reached on the paths of those constraints to the ground that are `wanted`.
+    pub fn poses_on_paths(&mut self, wanted: impl Fn(&Constraint<Expr<'g>>) -> bool) -> Vec<&mut Expr<'g>> {
+        let grounded = |c: &Constraint<Expr>| matches!(&c.bond, Bond::Cut(cut) if cut.grounded);
+        let each = self.tree.constraints.iter().zip(&mut self.work.constraints.reach);
+        let ends = each.filter(|(c, _)| grounded(c) && wanted(c)).flat_map(|(_, ends)| ends);
+        ends.flat_map(|(rot, pos)| rot.iter_mut().flatten().chain(pos)).collect()
+    }
+
     /// [`mbd_runtime::sweep::Sweeps::early_rows_act`], after the pass of the factorization.
     pub fn early_rows_act(&self) -> Expr<'g> {
         Sweeps { tree: &self.tree, trace: self.graph }.early_rows_act(&self.work.factor)

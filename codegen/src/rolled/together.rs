@@ -3,7 +3,7 @@
 use super::{build, siblings, RolledProgram, WIDTH};
 use crate::options::{Arithmetic, LikeBranches, Options};
 use crate::output::{Output, OutputProgram};
-use crate::plan::{Plan, RowsThatAct};
+use crate::plan::Plan;
 use crate::symbolic::{passes, Expr, Graph, Program};
 use crate::trace::rewrite;
 
@@ -18,10 +18,6 @@ pub struct Together {
 
 /// Like branches together in an output; `None` where there are none.
 pub fn together(plan: &Plan, group: Output, options: &Options) -> Option<OutputProgram<Together>> {
-    // Where the open modes of contacts leave no row, branches are as alike as without contacts.
-    if !matches!(plan.acts, RowsThatAct::All) && !plan.constraints.is_empty() {
-        return None;
-    }
     if options.plan.branches == LikeBranches::Apart {
         return None;
     }

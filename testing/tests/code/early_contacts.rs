@@ -8,6 +8,7 @@ use mbd_codegen::model::Model;
 use mbd_codegen::modes::words;
 use mbd_codegen::options::PlanOptions;
 use mbd_codegen::plan::Plan;
+use mbd_codegen::rolled::together;
 use mbd_codegen::search;
 use mbd_runtime::contact::{rows_that_act, Mode, Reducible};
 use mbd_runtime::Constrained;
@@ -16,6 +17,11 @@ use mbd_testing::relative_error;
 use mbd_testing::state::{random_state, State};
 
 const OUTPUTS: [Output; 3] = [Output::Rates, Output::ProjectMomenta, Output::Multipliers];
+
+/// Ways to compute an output.
+const OWN: &str = "by its own function";
+const TOGETHER: &str = "with like legs together";
+const PIECES: &str = "in pieces";
 
 fn fast() -> Options {
     let mut options = Options { arithmetic: Arithmetic::Fast, ..Options::default() };
@@ -71,15 +77,15 @@ fn error(a: &[f64], b: &[f64]) -> f64 {
     relative_error(a, b, 0.0)
 }
 
-/// Results in a set of modes with early rows, by a function of its own and in pieces, each with whether all early rows
-/// act; `None` where no rows are early.
+/// Results in a set of modes with early rows, each with how it was computed, and with whether all early rows act: by a function of
+/// its own, in pieces, and with like legs together where there are some. `None` where no rows are early.
 fn early(
     full: &Plan,
     pieces: &FactoredProgram,
     modes: &[Mode],
     state: &State,
     output: Output,
-) -> Option<[(Vec<f64>, bool); 2]> {
+) -> Option<Vec<(&'static str, Vec<f64>, bool)>> {
     let plan = acting(full, modes);
     let contacts = plan.early_contacts(Arithmetic::Fast);
     if contacts.is_empty() {
@@ -87,24 +93,34 @@ fn early(
     }
     let fused = |a: f64, b: f64, c: f64| a.mul_add(b, c);
     let second = if output == Output::Multipliers { state.v.clone() } else { momenta(state) };
-    let own = trace(&plan.with_early_contacts(&contacts), output, &fast()).unwrap_or_else(|e| panic!("{e}"));
+    let plan = plan.with_early_contacts(&contacts);
+    let own = trace(&plan, output, &fast()).unwrap_or_else(|e| panic!("{e}"));
     let given = state.inputs_of(&own.inputs, &second, &[]);
-    let mut result = own.program.evaluate(&given, fused);
-    let act = result.pop().expect("whether early rows act");
-    assert!(act == 0.0 || (act - 1.0).abs() < 1e-12, "{act}");
+    let flagged = |way, mut result: Vec<f64>| {
+        let act = result.pop().expect("whether early rows act");
+        assert!(act == 0.0 || (act - 1.0).abs() < 1e-12, "{way}: {act}");
+        (way, result, act != 0.0)
+    };
+    let mut all = vec![flagged(OWN, own.program.evaluate(&given, fused))];
+    if let Some(both) = together(&plan, output, &fast()) {
+        all.push(flagged(TOGETHER, both.program.program.evaluate(&given, fused)));
+        let apart = flagged(TOGETHER, both.program.apart.evaluate(&given, fused));
+        assert_eq!(apart, all[1]);
+    }
     // Which rows act is an input of pieces that no operation reads.
     let first = pieces.choose(modes).expect("modes of the model");
     let choice = pieces.with_late(&first, &given, fused);
-    Some([(result, act != 0.0), (pieces.evaluate(&choice, &given, fused), choice == first)])
+    all.push((PIECES, pieces.evaluate(&choice, &given, fused), choice == first));
+    Some(all)
 }
 
-/// Compares random states in random sets of modes. Gives how many results had early rows that acted, and how many had some
-/// that did not.
-fn compare(what: &str, plan: &Plan, output: Output, count: usize, seed: u64) -> [usize; 2] {
+/// Compares random states in random sets of modes. Gives how many results had early rows that acted, how many had some that did
+/// not, and how many were computed with like legs together.
+fn compare(what: &str, plan: &Plan, output: Output, count: usize, seed: u64) -> [usize; 3] {
     let (model, full) = (&plan.model, plan.with_contacts());
-    let Some(pieces) = factored(&full, output, &fast()) else { return [0; 2] };
+    let Some(pieces) = factored(&full, output, &fast()) else { return [0; 3] };
     let mut rng = Rng::new(seed, 5);
-    let mut counts = [0; 2];
+    let mut counts = [0; 3];
     for k in 0..count {
         let each = model.contacts.iter().map(|contact| match contact.friction > 0.0 {
             true => rng.pick(&[Mode::Open, Mode::Slide, Mode::Stick, Mode::Stick]),
@@ -114,10 +130,11 @@ fn compare(what: &str, plan: &Plan, output: Output, count: usize, seed: u64) -> 
         let state = random_state(&full, seed + 1000 * k as u64);
         let Some(results) = early(&full, &pieces.program, &modes, &state, output) else { continue };
         let expected = interpreted(&full, &modes, &state, output);
-        for (way, (result, act)) in ["by its own function", "in pieces"].into_iter().zip(results) {
+        for (way, result, act) in results {
             counts[usize::from(!act)] += 1;
+            counts[2] += usize::from(way == TOGETHER);
             // Where early rows do not act, pieces have taken the late ones, and a function leaves it to the one for all modes.
-            if act || way == "in pieces" {
+            if act || way == PIECES {
                 let (name, words, error) = (output.name(), words(&modes), error(&result, &expected));
                 assert!(error < 1e-9, "{what}, {name} in `{words}` {way}: {error:e}");
             }
@@ -128,43 +145,52 @@ fn compare(what: &str, plan: &Plan, output: Output, count: usize, seed: u64) -> 
 
 #[test]
 fn early_rows_bind_as_rows_at_the_ground_do() {
-    let mut sum = [0; 2];
+    let mut sum = [0; 3];
     // With eliminations that are searched for, and with one joint at a time.
     let searched = search::plan(&shipped("quadruped"), PlanOptions::default());
     let plain = Plan::new(&shipped("quadruped_hop"), 1e-9);
     for (k, output) in OUTPUTS.into_iter().enumerate() {
         for plan in [&searched, &plain] {
             let counts = compare(&plan.model.name, plan, output, 12, 7 + k as u64);
-            sum = [sum[0] + counts[0], sum[1] + counts[1]];
+            (0..3).for_each(|k| sum[k] += counts[k]);
         }
     }
-    println!("{} times all early rows acted, {} times not", sum[0], sum[1]);
-    assert!(sum[0] > 50, "{sum:?}");
+    println!(
+        "{} times all early rows acted, {} times not; {} times legs were computed together",
+        sum[0], sum[1], sum[2]
+    );
+    assert!(sum[0] > 50 && sum[2] > 20, "{sum:?}");
 }
 
 #[test]
 fn early_rows_of_random_robots_bind_as_rows_at_the_ground_do() {
-    let mut sum = [0; 2];
+    let mut sum = [0; 3];
     for seed in 0..18 {
         let plan = Plan::new(&legged(seed), 1e-9);
         let counts = compare(&format!("seed {seed}"), &plan, OUTPUTS[seed as usize % 3], 4, seed);
-        sum = [sum[0] + counts[0], sum[1] + counts[1]];
+        (0..3).for_each(|k| sum[k] += counts[k]);
     }
-    println!("{} times all early rows acted, {} times not", sum[0], sum[1]);
+    println!(
+        "{} times all early rows acted, {} times not; {} times legs were computed together",
+        sum[0], sum[1], sum[2]
+    );
     assert!(sum[0] > 50, "{sum:?}");
 }
 
 #[test]
 fn early_rows_of_random_mechanisms_bind_as_rows_at_the_ground_do() {
-    let mut sum = [0; 2];
+    let mut sum = [0; 3];
     for seed in 0..20 {
         if let Some(model) = with_feet(seed) {
             let plan = Plan::new(&model, 1e-9);
             let counts = compare(&format!("seed {seed}"), &plan, OUTPUTS[seed as usize % 3], 3, seed);
-            sum = [sum[0] + counts[0], sum[1] + counts[1]];
+            (0..3).for_each(|k| sum[k] += counts[k]);
         }
     }
-    println!("{} times all early rows acted, {} times not", sum[0], sum[1]);
+    println!(
+        "{} times all early rows acted, {} times not; {} times legs were computed together",
+        sum[0], sum[1], sum[2]
+    );
     assert!(sum[0] > 40, "{sum:?}");
 }
 
@@ -186,16 +212,19 @@ fn a_straight_leg_leaves_its_foot_to_late_rows() {
         // The contact point, hip and knee are in line where the knee is bent a little, by where the ball of the foot touches.
         for k in -100..=100 {
             state.q[knee] = 3e-3 * f64::from(k);
-            let [own, in_pieces] = early(&full, &pieces, &modes, &state, output).expect("early rows");
-            assert_eq!(own.1, in_pieces.1, "{} at {}", output.name(), state.q[knee]);
+            let all = early(&full, &pieces, &modes, &state, output).expect("early rows");
+            assert_eq!(all.len(), 3, "two legs stand, and two do not");
+            let acts = all[0].2;
             let expected = interpreted(&full, &modes, &state, output);
-            straight += usize::from(!own.1);
-            for (result, act) in [(&in_pieces.0, true), (&own.0, own.1)] {
+            straight += usize::from(!acts);
+            for (way, result, act) in &all {
+                assert_eq!(*act, acts, "{} {way} at {}", output.name(), state.q[knee]);
                 let error = error(result, &expected);
-                assert!(!act || error < 1e-10, "{} at {}: {error:e}", output.name(), state.q[knee]);
+                let holds = *act || *way == PIECES;
+                assert!(!holds || error < 1e-10, "{} {way} at {}: {error:e}", output.name(), state.q[knee]);
             }
             // Machine code made at run time: where early rows do not act the interpreter first, and code without them later.
-            let often = if own.1 { 1 } else { Compiled::<f64>::WORTHWHILE / 30 };
+            let often = if acts { 1 } else { Compiled::<f64>::WORTHWHILE / 30 };
             for _ in 0..often {
                 let error = error(&computed(&mut machine, &state, output), &expected);
                 assert!(error < 1e-10, "{} at {} in machine code: {error:e}", output.name(), state.q[knee]);

@@ -13,7 +13,7 @@ use mbd_codegen::plan::Plan;
 use mbd_codegen::read::Base;
 use mbd_codegen::rolled::{together, Vectors};
 use mbd_codegen::{search, Arithmetic, Options, Output, Precision};
-use mbd_testing::branches::{tree, with_loops, On, NUMBERS};
+use mbd_testing::branches::{on_feet, tree, with_loops, On, NUMBERS};
 use mbd_testing::state::{random_state, State};
 use mbd_testing::{assert_same_bits, relative_error};
 
@@ -163,6 +163,23 @@ fn loops_in_branches() {
     let [on_trunk, on_ground, both_on_trunk] = branches;
     assert!(on_trunk.iter().chain(&on_ground).all(|n| *n > 8), "only {branches:?} branches are computed together");
     assert!(both_on_trunk[0] == 0 && both_on_trunk[1] > 8, "{branches:?} branches are computed together");
+}
+
+/// Legs whose feet constraints bind to the ground.
+#[test]
+fn feet_on_the_ground() {
+    let mut branches = [0; 2];
+    for seed in 0..12 {
+        let numbers = NUMBERS[seed as usize % 4];
+        let model = on_feet(seed, numbers);
+        for arithmetic in [Arithmetic::Exact, Arithmetic::Fast] {
+            let options = options(arithmetic, EliminationStrategy::Single);
+            let plan = search::plan(&model, options.plan);
+            let what = format!("seed {seed}, {numbers:?}, {arithmetic:?}");
+            branches[usize::from(arithmetic == Arithmetic::Fast)] += compare(&what, &model, &plan, &options);
+        }
+    }
+    assert!(branches.iter().all(|n| *n > 24), "only {branches:?} branches are computed together");
 }
 
 #[test]
