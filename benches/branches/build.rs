@@ -1,9 +1,11 @@
 //! Generates the rates of legged robots and of mechanisms side by side, like branches together and apart.
 
 use mbd_codegen::model::{ConstraintKind, Model};
+use mbd_codegen::modes::ModeChoice;
 use mbd_codegen::options::LikeBranches;
 use mbd_codegen::read::{self, Base, ImportOptions};
 use mbd_codegen::{generate::generate_from, search, Arithmetic, Options, Output};
+use mbd_runtime::contact::Mode;
 
 /// Files of `models` (none: [`five_bar_legs`] or [`pinned_feet`]), how their roots are connected, and how many of them stand side by
 /// side on the ground.
@@ -18,6 +20,7 @@ const SCENES: [(&str, &str, Base, usize); 6] = [
 
 fn main() {
     let out = std::env::var("OUT_DIR").expect("cargo sets it");
+    quadruped(&out);
     for (name, file, base, count) in SCENES {
         let (path, text) = match file {
             "" if name == "feet" => ("pinned_feet.toml".to_string(), pinned_feet()),
@@ -65,6 +68,26 @@ fn trunk(name: &str) -> String {
     let trunk = body("trunk", 5.0, 0.01, 0.1);
     let joint = "[[joint]]\nname = \"j_trunk\"\ntype = \"floating\"\nchild = \"trunk\"\n\n";
     format!("name = \"{name}\"\ngravity = [0, 0, -9.81]\n\n{trunk}{joint}")
+}
+
+/// The quadruped of `models/contacts` in sets of modes: with all feet in the air, standing, trotting, and sliding. The stops of its
+/// knees are open.
+fn quadruped(out: &str) {
+    let path = "../../models/contacts/quadruped.toml";
+    println!("cargo:rerun-if-changed={path}");
+    let text = std::fs::read_to_string(path).expect("the model");
+    let model = read::model(path, &text, &ImportOptions::default());
+    let model = model.unwrap_or_else(|findings| panic!("{findings}")).model;
+    let model = Model { name: "model".to_string(), ..model };
+    let (o, x, s) = (Mode::Open, Mode::Stick, Mode::Slide);
+    let sets = [[o, o, o, o], [x, x, x, x], [x, o, o, x], [s, s, s, s]].map(|feet| [&feet[..], &[o; 8]].concat());
+    let mut options = Options { modes: Some(ModeChoice::Listed(sets.to_vec())), ..Options::default() }.of_model(true);
+    let plan = search::plan(&model, options.searches());
+    for branches in [LikeBranches::Apart, LikeBranches::Together] {
+        options.plan.branches = branches;
+        let code = generate_from(&plan, &options).expect("code").source;
+        std::fs::write(format!("{out}/quadruped_{}.rs", branches.name()), code).expect("written");
+    }
 }
 
 /// A quadruped each of whose legs is a planar five-bar: two motors on the trunk, whose links meet in the foot.

@@ -1,15 +1,16 @@
 //! Rows of feet that stand on the ground are solved where their legs begin: what functions for sets of modes and pieces
 //! then compute, what it costs, and what they tell where a leg cannot follow its foot.
 
-use mbd_codegen::factored::{factored, FactoredProgram};
-use mbd_codegen::generate::{trace, Arithmetic, Options, Output, RolledCode};
+use mbd_codegen::factored::{factored, Choice, FactoredProgram};
+use mbd_codegen::generate::{trace, Arithmetic, Options, Output, OutputProgram, RolledCode};
 use mbd_codegen::jit::Compiled;
 use mbd_codegen::model::Model;
 use mbd_codegen::modes::words;
 use mbd_codegen::options::PlanOptions;
 use mbd_codegen::plan::Plan;
-use mbd_codegen::rolled::together;
+use mbd_codegen::rolled::{together, Together};
 use mbd_codegen::search;
+use mbd_codegen::symbolic::Program;
 use mbd_runtime::contact::{rows_that_act, Mode, Reducible};
 use mbd_runtime::Constrained;
 use mbd_testing::random::{legged, with_feet, Rng};
@@ -77,41 +78,52 @@ fn error(a: &[f64], b: &[f64]) -> f64 {
     relative_error(a, b, 0.0)
 }
 
-/// Results in a set of modes with early rows, each with how it was computed, and with whether all early rows act: by a function of
-/// its own, in pieces, and with like legs together where there are some. `None` where no rows are early.
-fn early(
-    full: &Plan,
-    pieces: &FactoredProgram,
-    modes: &[Mode],
-    state: &State,
+/// The programs of an output in a set of modes with early rows.
+struct Early<'a> {
     output: Output,
-) -> Option<Vec<(&'static str, Vec<f64>, bool)>> {
-    let plan = acting(full, modes);
-    let contacts = plan.early_contacts(Arithmetic::Fast);
-    if contacts.is_empty() {
-        return None;
+    /// A function of its own, and one with like legs together where there are some.
+    own: OutputProgram<Program>,
+    together: Option<Together>,
+    pieces: &'a FactoredProgram,
+    /// The pieces of the modes.
+    first: Choice,
+}
+
+impl<'a> Early<'a> {
+    /// `None` where no rows are early.
+    fn new(full: &Plan, pieces: &'a FactoredProgram, modes: &[Mode], output: Output) -> Option<Self> {
+        let plan = acting(full, modes);
+        let contacts = plan.early_contacts(Arithmetic::Fast);
+        let plan = plan.with_early_contacts(&contacts);
+        (!contacts.is_empty()).then(|| Early {
+            output,
+            own: trace(&plan, output, &fast()).unwrap_or_else(|e| panic!("{e}")),
+            together: together(&plan, output, &fast()).map(|both| both.program),
+            pieces,
+            first: pieces.choose(modes).expect("modes of the model"),
+        })
     }
-    let fused = |a: f64, b: f64, c: f64| a.mul_add(b, c);
-    let second = if output == Output::Multipliers { state.v.clone() } else { momenta(state) };
-    let plan = plan.with_early_contacts(&contacts);
-    let own = trace(&plan, output, &fast()).unwrap_or_else(|e| panic!("{e}"));
-    let given = state.inputs_of(&own.inputs, &second, &[]);
-    let flagged = |way, mut result: Vec<f64>| {
-        let act = result.pop().expect("whether early rows act");
-        assert!(act == 0.0 || (act - 1.0).abs() < 1e-12, "{way}: {act}");
-        (way, result, act != 0.0)
-    };
-    let mut all = vec![flagged(OWN, own.program.evaluate(&given, fused))];
-    if let Some(both) = together(&plan, output, &fast()) {
-        all.push(flagged(TOGETHER, both.program.program.evaluate(&given, fused)));
-        let apart = flagged(TOGETHER, both.program.apart.evaluate(&given, fused));
-        assert_eq!(apart, all[1]);
+
+    /// Results, each with how it was computed, and with whether all early rows act.
+    fn at(&self, state: &State) -> Vec<(&'static str, Vec<f64>, bool)> {
+        let fused = |a: f64, b: f64, c: f64| a.mul_add(b, c);
+        let second = if self.output == Output::Multipliers { state.v.clone() } else { momenta(state) };
+        let given = state.inputs_of(&self.own.inputs, &second, &[]);
+        let flagged = |way, mut result: Vec<f64>| {
+            let act = result.pop().expect("whether early rows act");
+            assert!(act == 0.0 || (act - 1.0).abs() < 1e-12, "{way}: {act}");
+            (way, result, act != 0.0)
+        };
+        let mut all = vec![flagged(OWN, self.own.program.evaluate(&given, fused))];
+        if let Some(both) = &self.together {
+            all.push(flagged(TOGETHER, both.program.evaluate(&given, fused)));
+            assert_eq!(flagged(TOGETHER, both.apart.evaluate(&given, fused)), all[1]);
+        }
+        // Which rows act is an input of pieces that no operation reads.
+        let choice = self.pieces.with_late(&self.first, &given, fused);
+        all.push((PIECES, self.pieces.evaluate(&choice, &given, fused), choice == self.first));
+        all
     }
-    // Which rows act is an input of pieces that no operation reads.
-    let first = pieces.choose(modes).expect("modes of the model");
-    let choice = pieces.with_late(&first, &given, fused);
-    all.push((PIECES, pieces.evaluate(&choice, &given, fused), choice == first));
-    Some(all)
 }
 
 /// Compares random states in random sets of modes. Gives how many results had early rows that acted, how many had some that did
@@ -128,9 +140,9 @@ fn compare(what: &str, plan: &Plan, output: Output, count: usize, seed: u64) -> 
         });
         let modes: Vec<Mode> = each.collect();
         let state = random_state(&full, seed + 1000 * k as u64);
-        let Some(results) = early(&full, &pieces.program, &modes, &state, output) else { continue };
+        let Some(early) = Early::new(&full, &pieces.program, &modes, output) else { continue };
         let expected = interpreted(&full, &modes, &state, output);
-        for (way, result, act) in results {
+        for (way, result, act) in early.at(&state) {
             counts[usize::from(!act)] += 1;
             counts[2] += usize::from(way == TOGETHER);
             // Where early rows do not act, pieces have taken the late ones, and a function leaves it to the one for all modes.
@@ -208,11 +220,12 @@ fn a_straight_leg_leaves_its_foot_to_late_rows() {
         let machine = Compiled::<f64>::from_plan(full.clone(), fast().of_model(true)).expect("options");
         let mut machine = machine.acting(&acts);
         machine.inputs().tau.clone_from(&state.tau);
+        let early = Early::new(&full, &pieces, &modes, output).expect("early rows");
         let mut straight = 0;
         // The contact point, hip and knee are in line where the knee is bent a little, by where the ball of the foot touches.
         for k in -100..=100 {
             state.q[knee] = 3e-3 * f64::from(k);
-            let all = early(&full, &pieces, &modes, &state, output).expect("early rows");
+            let all = early.at(&state);
             assert_eq!(all.len(), 3, "two legs stand, and two do not");
             let acts = all[0].2;
             let expected = interpreted(&full, &modes, &state, output);
