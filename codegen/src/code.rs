@@ -49,11 +49,7 @@ impl Code {
 
     /// Whether an operation reads a table.
     pub fn looks_up(&self) -> bool {
-        match cfg!(feature = "height_fields") {
-            #[cfg(feature = "height_fields")]
-            true => self.operations().any(|op| matches!(op, Op::LookUp(_))),
-            _ => false,
-        }
+        self.operations().any(Op::looks_up)
     }
 
     /// Bits of the constants that operations have.

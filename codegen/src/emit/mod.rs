@@ -152,8 +152,12 @@ struct Function<'a> {
 impl<'a> Function<'a> {
     /// The program that computes like branches together for one state.
     fn together(&self) -> Option<(&'a RolledProgram, Vectors)> {
-        let Kind::Whole(program) = &self.program else { return None };
-        let own = self.together.iter().find(|(name, ..)| *name == program.spec.name);
+        let output = match &self.program {
+            Kind::Whole(program) => program.spec.name,
+            #[cfg(feature = "factored")]
+            Kind::Factored(program) => program.spec.name,
+        };
+        let own = self.together.iter().find(|(name, ..)| *name == output);
         own.map(|(_, program, vectors)| (program, *vectors))
     }
 

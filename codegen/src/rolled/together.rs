@@ -4,7 +4,7 @@ use super::{build, siblings, RolledProgram, WIDTH};
 use crate::options::{Arithmetic, LikeBranches, Options};
 use crate::output::{Output, OutputProgram};
 use crate::plan::Plan;
-use crate::symbolic::{passes, Expr, Graph, Program};
+use crate::symbolic::{passes, Expr, Graph, Op, Program};
 use crate::trace::rewrite;
 
 /// The program of an output that computes like branches together, and the same statements branch by branch.
@@ -23,6 +23,11 @@ pub fn together(plan: &Plan, group: Output, options: &Options) -> Option<OutputP
     }
     let fast = options.arithmetic == Arithmetic::Fast;
     let built = build::build(plan, group, options, |tree, _| siblings::find(tree, fast))?;
+    // Tables are read one lane after the other.
+    let mut operations = built.program.blocks.iter().flat_map(|block| &block.program.steps).map(|(_, op, _)| op);
+    if operations.any(Op::looks_up) {
+        return None;
+    }
     let count = built.inputs.iter().map(crate::output::InputArray::len).sum::<usize>();
     Some(built.map(|program| {
         let graph = Graph::default();

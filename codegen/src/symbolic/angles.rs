@@ -45,9 +45,7 @@ impl Angles {
         let mut involved = BTreeSet::new();
         for (id, op, _) in &program.steps {
             let functions = matches!(op, Op::Sin(_) | Op::Cos(_) | Op::Sqrt(_) | Op::Div(..) | Op::ReciprocalAbove(_));
-            #[cfg(feature = "height_fields")]
-            let functions = functions || matches!(op, Op::LookUp(_));
-            if functions || nodes(op).any(|k| involved.contains(&k)) {
+            if functions || op.looks_up() || nodes(op).any(|k| involved.contains(&k)) {
                 involved.insert(*id);
             }
         }

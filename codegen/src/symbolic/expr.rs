@@ -77,6 +77,14 @@ pub struct FlooredReciprocal {
 }
 
 impl Op {
+    /// Whether it reads a table.
+    pub fn looks_up(&self) -> bool {
+        #[cfg(feature = "height_fields")]
+        return matches!(self, Op::LookUp(_));
+        #[cfg(not(feature = "height_fields"))]
+        false
+    }
+
     /// The operands of the operation.
     pub fn operands(&self) -> impl Iterator<Item = Operand> {
         let all = match *self {

@@ -8,6 +8,7 @@ use mbd_codegen::model::Model;
 use mbd_codegen::modes::words;
 use mbd_codegen::options::PlanOptions;
 use mbd_codegen::plan::Plan;
+use mbd_codegen::read::{self, ImportOptions};
 use mbd_codegen::rolled::{together, Together};
 use mbd_codegen::search;
 use mbd_codegen::symbolic::Program;
@@ -245,6 +246,27 @@ fn a_straight_leg_leaves_its_foot_to_late_rows() {
         }
         println!("{}: a foot is left to late rows in {straight} of 201 positions", output.name());
         assert!((1..70).contains(&straight), "{straight}");
+    }
+}
+
+/// Heights are read one lane after the other: a loop over legs would read those of four lanes for a pair.
+#[test]
+fn legs_on_hills_are_computed_one_after_the_other() {
+    let path = format!("{}/../models/contacts/quadruped.toml", env!("CARGO_MANIFEST_DIR"));
+    let plane = std::fs::read_to_string(&path).expect("the model");
+    let heights = [[0.0, 0.1, 0.0, 0.1, 0.0]; 5];
+    let field = format!("type = \"height_field\"\nspacing = [1, 1]\nheights = {heights:?}");
+    let hills = plane.replacen("type = \"plane\"", &field, 1);
+    let legs = [(&plane, true), (&hills, false)];
+    for (text, expected) in legs {
+        let model = read::model(&path, text, &ImportOptions::default()).unwrap_or_else(|findings| panic!("{findings}"));
+        let full = Plan::new(&model.model, 1e-9).with_contacts();
+        let mut modes = vec![Mode::Open; model.model.contacts.len()];
+        modes[..4].fill(Mode::Stick);
+        let plan = acting(&full, &modes);
+        let plan = plan.with_early_contacts(&plan.early_contacts(Arithmetic::Fast));
+        assert!(plan.early_tolerance.is_some());
+        assert_eq!(together(&plan, Output::Rates, &fast()).is_some(), expected);
     }
 }
 
