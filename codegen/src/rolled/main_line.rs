@@ -217,7 +217,7 @@ impl<'m> MainLine<'m, '_> {
 
     /// What the branches of a run take in besides what their parent hands to them: if constraints bind them to the ground, the poses
     /// on the paths from there, and gravity.
-    fn from_ground(&mut self, k: usize) -> Vec<Expr<'m>> {
+    fn taken_from_ground(&mut self, k: usize) -> Vec<Expr<'m>> {
         let Some(branches) = &self.runs[k].branches else { return Vec::new() };
         let rows = branches.first.rows..branches.first.rows + branches.size.rows;
         let stub = |c: &Constraint<Expr>| c.slots.is_empty() && rows.contains(&c.first);
@@ -242,7 +242,7 @@ impl<'m> MainLine<'m, '_> {
         });
         match direction {
             SweepDirection::TipToBase => start.clear(),
-            SweepDirection::BaseToTip => start.extend(self.from_ground(k)),
+            SweepDirection::BaseToTip => start.extend(self.taken_from_ground(k)),
         }
         let given: usize = self.given.arrays.iter().map(InputArray::len).sum();
         self.unfit |= start.iter().any(|e| match *e {
