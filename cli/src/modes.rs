@@ -87,6 +87,7 @@ pub fn count(plan: &Plan, options: &Options, out: &mut dyn Write) -> Outcome {
     };
     for (set, counts) in &generated.sets {
         let acting = full.acting(&rows_that_act(full.dims.rows, &full.contacts::<f64>(), set));
+        let acting = acting.with_early_contacts(&acting.early_contacts(options.arithmetic));
         for (output, counts) in counts {
             line(&words(set), &acting, *output, counts.total())?;
         }

@@ -237,14 +237,11 @@ impl<'g, 'a> Link<'g, 'a> {
             }
         }
         let inward = if direction == SweepDirection::TipToBase { keys } else { &[] };
-        // A sweep that other branches need may have nothing to do in this one.
-        let idle = |sweep: usize| !all.keys().any(|key| key[0] == sweep);
-        let nothing: BTreeMap<[usize; 2], Expr<'g>> =
-            inward.iter().filter(|key| idle(key[0])).map(|key| (*key, Expr::zero())).collect();
-        all.extend(nothing);
-        let mut outgoing: Vec<Expr<'g>> = inward.iter().map(|key| all.remove(key)).collect::<Option<_>>()?;
+        // What a branch lacks is of constraints of others.
+        let mut outgoing: Vec<Expr<'g>> = inward.iter().map(|key| all.remove(key).unwrap_or(Expr::zero())).collect();
         // Columns of rows that are solved in the branch stay in it.
-        if !all.values().all(|e| matches!(e, Expr::Const(x) if *x == 0.0)) {
+        let is_zero = |e: &Expr| matches!(e, Expr::Const(x) if *x == 0.0);
+        if !all.values().chain(&self.stage.columns_at(0)).all(is_zero) {
             return None;
         }
         if direction == SweepDirection::TipToBase && self.stage.tree.early_tolerance.is_some() {

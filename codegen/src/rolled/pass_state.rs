@@ -190,6 +190,13 @@ impl<'g, 'a> PassState<'g, 'a> {
         ends.flat_map(|(rot, pos)| rot.iter_mut().flatten().chain(pos)).collect()
     }
 
+    /// The columns of all unknowns at a node.
+    pub fn columns_at(&self, i: usize) -> Vec<Expr<'g>> {
+        let n = self.tree.nodes.len();
+        let columns = (0..self.tree.unknowns.len()).map(|g| self.work.factor.columns[g * n + i]);
+        columns.flat_map(|column| [column.lin, column.ang].concat()).collect()
+    }
+
     /// [`mbd_runtime::sweep::Sweeps::early_rows_act`], after the pass of the factorization.
     pub fn early_rows_act(&self) -> Expr<'g> {
         Sweeps { tree: &self.tree, trace: self.graph }.early_rows_act(&self.work.factor)
