@@ -4,6 +4,9 @@
 //! of the same kinds. Constants may differ in everything, their zeros and signs included: what is not the same in all branches
 //! becomes a column of the table. Steps that only some of the placements have are let in elsewhere as identities.
 
+mod branch;
+mod steps;
+
 use std::ops::Range;
 
 use mbd_runtime::tree::Tree;
@@ -12,9 +15,6 @@ use self::branch::{nodes_of, Branch};
 use self::steps::{union, Steps};
 use super::runs::{columns_of, map_constraint, slots_of, Branches, Run, Slot};
 use crate::symbolic::Expr;
-
-mod branch;
-mod steps;
 
 /// Largest number of branches in a set: the lanes of a vector register.
 pub const WIDTH: usize = 4;
