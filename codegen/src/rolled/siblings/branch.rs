@@ -183,8 +183,8 @@ fn form(constraint: &Constraint<f64>) -> Constraint<f64> {
 /// The numbers of a branch.
 struct Numbers<'a> {
     nodes: Range<usize>,
-    /// Number that the first of them gets: after one that stands for the parent, where that is a node, and one at which rows are solved, where
-    /// there are some.
+    /// Number that the first of them gets: after one that stands for the parent, where that is a node, and one at which rows are
+    /// solved, where there are some.
     offset: usize,
     parent: Option<usize>,
     first: Extent,
