@@ -53,7 +53,7 @@ pub enum GenerateError {
     },
     /// All sets of modes are asked for, and they are too many.
     TooManyModes {
-        /// Their number.
+        /// Their number; the largest of all numbers where there are more.
         sets: usize,
         /// Largest number.
         most: usize,
@@ -113,7 +113,11 @@ impl fmt::Display for GenerateError {
                 )
             }
             GenerateError::TooManyModes { sets, most } => {
-                write!(f, "there are {sets} sets of modes, and at most {most} get code of their own: list those that a motion visits (`mbd modes --record`)")
+                let sets = match *sets {
+                    usize::MAX => "more sets of modes than can be counted".to_string(),
+                    sets => format!("{sets} sets of modes"),
+                };
+                write!(f, "the contacts have {sets}, and at most {most} get code of their own: list those that a motion visits (`mbd modes --record`)")
             }
             GenerateError::ModesNotFactored { model } => {
                 write!(f, "the contacts of `{model}` have too many modes for pieces, which serve limbs that have a few contacts each: list those that a motion visits (`mbd modes --record`)")

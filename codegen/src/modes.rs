@@ -180,6 +180,10 @@ mod tests {
     fn all_sets_of_a_quadruped_are_too_many() {
         let model = scene();
         assert!(matches!(ModeChoice::All.sets(&model), Err(GenerateError::TooManyModes { .. })));
+        let chain = include_str!("../../models/contacts/chain_on_floor.toml");
+        let chain = read::model("chain.toml", chain, &ImportOptions::default()).expect("a model").model;
+        let error = ModeChoice::All.sets(&chain).expect_err("more than 2^64").to_string();
+        assert!(error.contains("more sets of modes than can be counted"), "{error}");
         let hopper = include_str!("../../models/contacts/hopper.toml");
         let hopper = read::model("hopper.toml", hopper, &ImportOptions::default()).expect("a model").model;
         let sets = ModeChoice::All.sets(&hopper).expect("few");
