@@ -73,6 +73,14 @@ pub(crate) fn rewrite(options: &Options) -> Rewrite {
     }
 }
 
+/// What an output takes and gives in a plan: with early rows of contacts also whether all of them act.
+pub(crate) fn spec_of(plan: &Plan, output: Output) -> &'static Spec {
+    match plan.early_tolerance {
+        Some(_) => output.with_early_rows(),
+        None => output.spec(),
+    }
+}
+
 /// The tree of a plan for one output, not regrouped.
 pub(crate) fn symbolic_tree<'g>(
     plan: &Plan,
@@ -108,7 +116,7 @@ pub(crate) fn symbolic_tree<'g>(
 pub fn trace(plan: &Plan, output: Output, options: &Options) -> Result<OutputProgram<Program>, GenerateError> {
     check_availability(plan, output)?;
     let frames = chosen_frames(plan, options)?;
-    let spec = if plan.early_tolerance.is_some() { output.with_early_rows() } else { output.spec() };
+    let spec = spec_of(plan, output);
     let (graph, sizes) = (Graph::default(), sizes(plan, options, frames.len()));
     let given = SymbolicInputs::new(&graph, plan, spec, options);
     let mut physical = symbolic_tree(plan, output, &given, options);

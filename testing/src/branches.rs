@@ -23,6 +23,20 @@ pub enum Numbers {
 /// All of them.
 pub const NUMBERS: [Numbers; 4] = [Numbers::Same, Numbers::Mirrored, Numbers::Different, Numbers::ZerosInOne];
 
+/// A floating body on which branches hang.
+const TRUNK: &str = r#"[[body]]
+name = "trunk"
+mass = 5.0
+com = [0.1, 0, 0.02]
+inertia = [0.2, 0.3, 0.4]
+
+[[joint]]
+name = "base"
+type = "floating"
+child = "trunk"
+
+"#;
+
 const KINDS: [&str; 4] = ["revolute", "prismatic", "spherical", "universal"];
 
 /// One body with its joint; without a parent it hangs on the ground.
@@ -63,8 +77,7 @@ pub fn with_loops(seed: u64, numbers: Numbers, on: On) -> Model {
     let mut text = "name = \"loops\"\ngravity = [0, 0, -9.81]\n\n".to_string();
     let parent = match on {
         On::Trunk | On::TrunkBoth => {
-            text += "[[body]]\nname = \"trunk\"\nmass = 5.0\ncom = [0.1, 0, 0.02]\ninertia = [0.2, 0.3, \
-                     0.4]\n\n[[joint]]\nname = \"base\"\ntype = \"floating\"\nchild = \"trunk\"\n\n";
+            text += TRUNK;
             "trunk"
         }
         On::Ground => "",
@@ -121,11 +134,7 @@ pub fn with_loops(seed: u64, numbers: Numbers, on: On) -> Model {
 /// If the reader refuses the text.
 pub fn on_feet(seed: u64, numbers: Numbers) -> Model {
     let mut rng = Rng::new(seed, 5);
-    let mut text =
-        "name = \"on_feet\"\ngravity = [0, 0, -9.81]\n\n[[body]]\nname = \"trunk\"\nmass = 5.0\ncom = [0.1, 0, \
-                    0.02]\ninertia = [0.2, 0.3, 0.4]\n\n[[joint]]\nname = \"base\"\ntype = \"floating\"\nchild = \
-                    \"trunk\"\n\n"
-            .to_string();
+    let mut text = format!("name = \"on_feet\"\ngravity = [0, 0, -9.81]\n\n{TRUNK}");
     let legs = 2 + rng.below(4);
     let kind = rng.pick(&["spherical", "point_on_plane", "distance"]);
     let decay = if rng.chance(0.5) { "decay = 5\n" } else { "" };
@@ -172,11 +181,7 @@ fn of_branch(seed: u64, branch: usize, numbers: Numbers) -> (Rng, [f64; 3]) {
 /// If the reader refuses the text.
 pub fn tree(seed: u64, numbers: Numbers) -> Model {
     let mut rng = Rng::new(seed, 3);
-    let mut text =
-        "name = \"tree\"\ngravity = [0, 0, -9.81]\n\n[[body]]\nname = \"trunk\"\nmass = 5.0\ncom = [0.1, 0, \
-                    0.02]\ninertia = [0.2, 0.3, 0.4]\n\n[[joint]]\nname = \"base\"\ntype = \"floating\"\nchild = \
-                    \"trunk\"\n\n"
-            .to_string();
+    let mut text = format!("name = \"tree\"\ngravity = [0, 0, -9.81]\n\n{TRUNK}");
     let (branches, length) = (2 + rng.below(5), 1 + rng.below(4));
     let kinds: Vec<&str> = (0..length).map(|_| if rng.chance(0.7) { "revolute" } else { rng.pick(&KINDS) }).collect();
     let fingers = rng.chance(0.3);

@@ -13,7 +13,7 @@ use super::names::{heading, Names};
 use super::together::TogetherWriter;
 use crate::plan::Plan;
 use crate::rolled::Vectors;
-use crate::symbolic::angles::{nodes, Angles, Pairs};
+use crate::symbolic::angles::{nodes, with_operands, Angles, Pairs};
 use crate::symbolic::{Label, Op, Program, ProgramResult};
 
 /// Places in memory that a loop may use: LLVM compares no more than 250 with each other (`alias-set-saturation-threshold`).
@@ -144,7 +144,7 @@ impl<'a> Straight<'a> {
         let composite: Vec<(usize, u32)> =
             self.angles.early.keys().copied().enumerate().filter(|(_, angle)| !copied.contains_key(angle)).collect();
         if !composite.is_empty() {
-            let steps = self.needed_for(composite.iter().map(|(_, angle)| *angle).collect());
+            let steps = with_operands(self.program, composite.iter().map(|(_, angle)| *angle).collect());
             // No vectors are made of a loop whose inputs may overlap with what it writes. In one array, its rows are free until the
             // inputs of the other loop are copied.
             let read: Vec<(u32, u32)> = self.given_of(&steps).filter(|(id, _)| !copied.contains_key(id)).collect();
@@ -180,16 +180,6 @@ impl<'a> Straight<'a> {
             copied.insert(*angle, format!("angles[{k}]"));
         }
         copied
-    }
-
-    /// Some steps, and those before the sines that they use.
-    fn needed_for(&self, mut steps: BTreeSet<u32>) -> BTreeSet<u32> {
-        for (id, op, _) in self.program.steps.iter().rev() {
-            if steps.contains(id) {
-                steps.extend(nodes(op));
-            }
-        }
-        steps
     }
 
     /// Those of the program's steps that are in a set, in order. Many statements are written in blocks that return the

@@ -16,7 +16,7 @@ use crate::options::Options;
 use crate::output::{Dim, InputArray, Output, OutputProgram};
 use crate::plan::Plan;
 use crate::symbolic::{passes, Expr, Graph, Op, Operand, ProgramResult};
-use crate::trace::{rewrite, sizes, symbolic_tree, SymbolicInputs};
+use crate::trace::{rewrite, sizes, spec_of, symbolic_tree, SymbolicInputs};
 
 /// Builds the loop form with the runs that `find` finds among the nodes that are allowed; `None` where there are none.
 pub fn build(
@@ -27,7 +27,7 @@ pub fn build(
 ) -> Option<OutputProgram<RolledProgram>> {
     let sweeps = OutputSweeps::of(group)?;
     let graph = Graph::default();
-    let spec = if plan.early_tolerance.is_some() { group.with_early_rows() } else { group.spec() };
+    let spec = spec_of(plan, group);
     let given = SymbolicInputs::new(&graph, plan, spec, options);
     let tree = symbolic_tree(plan, group, &given, options).regrouped();
     let (plan_of_tree, tree) = match (group, &plan.accelerations) {

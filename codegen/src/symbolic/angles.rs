@@ -25,6 +25,16 @@ pub fn nodes(op: &Op) -> impl Iterator<Item = u32> {
     op.operands().filter_map(|o| if let Operand::Node(k) = o { Some(k) } else { None })
 }
 
+/// Some nodes of a program, and all that they are computed from.
+pub fn with_operands(program: &Program, mut wanted: BTreeSet<u32>) -> BTreeSet<u32> {
+    for (id, op, _) in program.steps.iter().rev() {
+        if wanted.contains(id) {
+            wanted.extend(nodes(op));
+        }
+    }
+    wanted
+}
+
 /// Division of a program into the part before its sines and cosines and the part after them.
 #[derive(Default)]
 pub struct Angles {
@@ -51,16 +61,13 @@ impl Angles {
         }
         let mut angles = Angles::default();
         (angles.late, angles.early) = pairs(program).into_iter().partition(|(a, _)| involved.contains(a));
-        angles.before.extend(angles.early.keys());
+        angles.before = with_operands(program, angles.early.keys().copied().collect());
         for result in &program.outputs {
             if let ProgramResult::Node(id, _) = result {
                 angles.after.insert(*id);
             }
         }
         for (id, op, _) in program.steps.iter().rev() {
-            if angles.before.contains(id) {
-                angles.before.extend(nodes(op));
-            }
             let early = matches!(op, Op::Sin(a) | Op::Cos(a) if angles.early.contains_key(a));
             if angles.after.contains(id) && !early {
                 angles.after.extend(nodes(op));
