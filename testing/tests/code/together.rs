@@ -13,10 +13,12 @@ use mbd_codegen::plan::Plan;
 use mbd_codegen::read::Base;
 use mbd_codegen::rolled::{together, Vectors};
 use mbd_codegen::{search, Arithmetic, Options, Output, Precision};
+use mbd_runtime::{Real, Scalar};
 use mbd_testing::branches::{on_feet, tree, with_loops, On, NUMBERS};
 use mbd_testing::state::{random_state, State};
 use mbd_testing::{assert_same_bits, relative_error};
 
+use crate::wide::Wide;
 use crate::{machine_code, wide};
 
 fn options(arithmetic: Arithmetic, elimination: EliminationStrategy) -> Options {
@@ -40,6 +42,11 @@ fn compare(what: &str, model: &Model, plan: &Plan, options: &Options) -> usize {
         assert_ne!(output, Output::Energy, "{what}: energies add up over all nodes in order");
         let given = s.inputs_of(&both.inputs, &p, &a);
         let expected = evaluated::<f64>(plan, options, &s, (output, true), &both.inputs, &given);
+        let straight = trace(plan, output, options).expect("a program").program;
+        let exact = || {
+            let given: Vec<Wide> = given.iter().map(|x| Wide::constant(*x)).collect();
+            straight.evaluate(&given, |a, b, c| a * b + c).into_iter().map(Wide::to_f64).collect()
+        };
         if output == Output::Rates {
             branches = both.program.program.loops.iter().map(|l| l.branches.len()).sum();
         }
@@ -50,9 +57,7 @@ fn compare(what: &str, model: &Model, plan: &Plan, options: &Options) -> usize {
             if options.arithmetic == Arithmetic::Exact {
                 assert_same_bits(what, output.name(), model, &results, &expected);
             }
-            // Some hundred roundings, and their growth by the condition of the inertia.
-            let off = relative_error(&results, &expected, 1.0);
-            assert!(off <= 1e-11, "{what}: {output:?} is {off:e} off");
+            assert_near(&format!("{what}: {output:?}"), &results, &expected, &exact);
         }
         let doubles = evaluated::<f64>(plan, options, &s, (output, false), &both.inputs, &given);
         let singles = evaluated::<f32>(plan, options, &s, (output, false), &both.inputs, &given);
@@ -67,19 +72,28 @@ fn compare(what: &str, model: &Model, plan: &Plan, options: &Options) -> usize {
                 assert_same_bits(what, &format!("{output:?}, machine code, f32"), model, &singles, &expected);
             }
             Arithmetic::Fast => {
-                for (results, error) in [(doubles, 1e-11), (singles, 1e-2)] {
-                    let off = relative_error(&results, &expected, 1.0);
-                    assert!(off <= error, "{what}: {output:?} by machine code is {off:e} off");
-                }
+                assert_near(&format!("{what}: {output:?} by machine code"), &doubles, &expected, &exact);
+                let off = relative_error(&singles, &expected, 1.0);
+                assert!(off <= 1e-2, "{what}: {output:?} by machine code, f32, is {off:e} off");
             }
         }
-        let straight = trace(plan, output, options).expect("a program").program.counts().total();
         let apart = both.program.apart.counts().total();
         if options.arithmetic == Arithmetic::Exact {
-            assert_eq!(apart, straight, "{what}: {output:?} has other operations");
+            assert_eq!(apart, straight.counts().total(), "{what}: {output:?} has other operations");
         }
     }
     branches
+}
+
+/// Asserts that results are as good as the interpreter's: some hundred roundings and their growth by a usual condition of the
+/// inertia away from them, or, where the condition is worse, not much farther than them from `exact` results.
+fn assert_near(what: &str, results: &[f64], expected: &[f64], exact: &impl Fn() -> Vec<f64>) {
+    let off = relative_error(results, expected, 1.0);
+    if off <= 1e-11 {
+        return;
+    }
+    let [own, theirs] = [results, expected].map(|found| relative_error(found, &exact(), 1.0));
+    assert!(own <= 3.0 * theirs, "{what} is {off:e} off, {own:e} from exact results and the interpreter {theirs:e}");
 }
 
 /// An output by machine code, or by the interpreter; `given` are the entries of its inputs.
@@ -191,8 +205,7 @@ fn feet_on_the_ground() {
 #[test]
 #[ignore = "takes half a minute: cargo test -p mbd-testing --test code together -- --ignored"]
 fn more_feet_on_the_ground() {
-    // In the state of the next seed the rates of fast arithmetic are 1.07e-11 off, above the limit: nobody has looked why.
-    compare_feet(5..15);
+    compare_feet(5..25);
 }
 
 fn compare_feet(seeds: std::ops::Range<u64>) {
