@@ -22,7 +22,7 @@ code!(solo12_exact_apart, solo12_exact_together, solo12_fast_apart, solo12_fast_
 code!(g1_exact_apart, g1_exact_together, g1_fast_apart, g1_fast_together);
 code!(arms_exact_apart, arms_exact_together, arms_fast_apart, arms_fast_together);
 code!(five_bars_exact_apart, five_bars_exact_together, five_bars_fast_apart, five_bars_fast_together);
-code!(feet_fast_apart, feet_fast_together);
+code!(feet_exact_apart, feet_exact_together, feet_fast_apart, feet_fast_together);
 code!(quadruped_apart, quadruped_together);
 code!(four_bars_exact_apart, four_bars_exact_together, four_bars_fast_apart, four_bars_fast_together);
 
@@ -155,6 +155,7 @@ fn main() {
         compare!("five-bar legs, fast ", five_bars_fast_apart, five_bars_fast_together, 401);
         compare!("five-bar legs, exact", five_bars_exact_apart, five_bars_exact_together, 401);
         compare!("pinned feet, fast ", feet_fast_apart, feet_fast_together, 401);
+        compare!("pinned feet, exact", feet_exact_apart, feet_exact_together, 401);
         with_contacts();
         compare!("fifty four-bars, fast ", four_bars_fast_apart, four_bars_fast_together, 201);
         compare!("fifty four-bars, exact", four_bars_exact_apart, four_bars_exact_together, 201);

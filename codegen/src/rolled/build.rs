@@ -3,13 +3,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mbd_runtime::tree::{Bond, Closure, Constraint, Cut, Source, Tree, TreeFrame, Unknown};
-use mbd_runtime::Scalar;
+use mbd_runtime::tree::{Source, Tree};
 
 use super::link::Link;
 use super::main_line::{Event, MainLine};
 use super::partition::{assemble, output, partition, Body, Requests};
 use super::pass_state::{OutputSweeps, PassState};
+use super::rest::without_inner;
 use super::runs::{Extent, Run};
 use super::{Block, Loop, Place, Repeat, RolledProgram, Start, Target};
 use crate::options::Options;
@@ -72,46 +72,6 @@ pub fn build(
     let mut build = Build { line: &line, graphs: &graphs, links: &links, starts: &starts, own, results };
     let program = build.program(options);
     Some(OutputProgram { spec, inputs: line.given.arrays, program })
-}
-
-/// The tree without the constraints inside of branches, and without columns of their unknowns, which nothing else asks for.
-fn without_inner<'g>(mut tree: Tree<Expr<'g>>, runs: &[Run]) -> Tree<Expr<'g>> {
-    for run in runs {
-        let Some(branches) = &run.branches else { continue };
-        for turn in 0..run.count() {
-            let within = |at: usize, first: usize, stride: usize, size: usize| {
-                (first + turn * stride..first + turn * stride + size).contains(&at)
-            };
-            let (first, stride, size) = (branches.first, branches.stride, branches.size);
-            let rows = |row: usize| within(row, first.rows, stride.rows, size.rows);
-            // All branches hang on the same path from the ground.
-            let without = |c: Constraint<Expr<'g>>| match rows(c.first) {
-                true => to_ground(c).filter(|_| turn == 0 && branches.parent.is_some()),
-                false => Some(c),
-            };
-            tree.constraints = std::mem::take(&mut tree.constraints).into_iter().filter_map(without).collect();
-            // What is solved at the ground in the branches meets nothing else there.
-            let outer = |g: usize| match tree.unknowns[g] {
-                Unknown::Row(row) => !rows(row),
-                Unknown::Velocity(v) => !within(v, first.v, stride.v, size.v),
-            };
-            tree.solve_at_ground.retain(|&g| outer(g));
-            tree.nodes.iter_mut().for_each(|node| node.elimination.retain_columns(outer));
-        }
-    }
-    tree
-}
-
-/// What the rest of the tree needs of a constraint that binds a branch to the ground: the way from there to the branch, of which
-/// the branch takes in the pose, and along which it hands wrenches on. `None` for other constraints.
-fn to_ground(constraint: Constraint<Expr>) -> Option<Constraint<Expr>> {
-    let Bond::Cut(cut) = constraint.bond else { return None };
-    let nowhere = || TreeFrame { node: None, place: Vec::new() };
-    let bond = Bond::Cut(Cut { closure: Closure::Fixed, a: nowhere(), b: nowhere(), ..cut });
-    // Nothing is known of its rows, as if they were to decay.
-    let decay = Some(Expr::zero());
-    let constraint = Constraint { bond, slots: Vec::new(), passes: Vec::new(), decay, ..constraint };
-    cut.grounded.then_some(constraint)
 }
 
 /// First coordinate, velocity and row of a run.

@@ -12,6 +12,7 @@ mod link;
 mod main_line;
 mod partition;
 mod pass_state;
+mod rest;
 mod runs;
 mod share;
 mod siblings;

@@ -93,9 +93,8 @@ fn on_path<'g>(constraint: &Constraint<Expr<'_>>, run: &Run) -> Constraint<Expr<
         Bond::Coupling { .. } => [Vec::new(), Vec::new()],
     };
     let grounded = matches!(&constraint.bond, Bond::Cut(cut) if cut.grounded);
-    let nowhere = || TreeFrame { node: None, place: Vec::new() };
     Constraint {
-        bond: Bond::Cut(Cut { closure: Closure::Fixed, a: nowhere(), b: nowhere(), path_a, path_b, grounded }),
+        bond: only_paths([path_a, path_b], grounded),
         slots: constraint.slots.clone(),
         passes: Vec::new(),
         first: constraint.first,
@@ -105,6 +104,12 @@ fn on_path<'g>(constraint: &Constraint<Expr<'_>>, run: &Run) -> Constraint<Expr<
         own_axes: false,
         velocities: Vec::new(),
     }
+}
+
+/// A bond of which nothing but the paths to its two frames is known.
+pub fn only_paths<'g>([path_a, path_b]: [Vec<usize>; 2], grounded: bool) -> Bond<Expr<'g>> {
+    let nowhere = || TreeFrame { node: None, place: Vec::new() };
+    Bond::Cut(Cut { closure: Closure::Fixed, a: nowhere(), b: nowhere(), path_a, path_b, grounded })
 }
 
 /// A node without inertia and motion, at which rows are solved that bind branches of one node to one another, or to that node: it

@@ -526,13 +526,10 @@ where
         self.origin.clear();
         Chart::relative(system, &step.delta, &mut self.origin);
         self.past_h = h;
-        if step.end_known {
-            step.hand_on(system, &mut self.first, &mut self.weight);
-        }
         if self.derivatives == Derivatives::New {
             self.derivatives = Derivatives::Old;
         }
-        step.end_known
+        step.hand_on(system, &mut self.first)
     }
 
     /// The collocation polynomial; of methods with less than three stages the cubic through both ends and their rates.

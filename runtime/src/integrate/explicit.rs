@@ -8,7 +8,7 @@ use super::StepError;
 use crate::constant::Constant;
 use crate::system::{Real, System};
 
-/// A method with `S` stages, and `X` more for dense output, by name.
+/// A method with `S` stages, by name. With `X - 1` more for dense output, if `X` is not zero.
 pub trait Method<const S: usize, const X: usize> {
     /// Coefficients of the method.
     const TABLEAU: &'static Tableau<S>;
@@ -45,8 +45,8 @@ methods! {
     Rkf45 6 0 RKF45 "Fehlberg's pair of orders 4 and 5: six evaluations a step. E. Fehlberg, NASA TR R-315, 1969.";
     CashKarp 6 0 CASH_KARP "Cash and Karp's pair of orders 5 and 4: six evaluations a step. ACM TOMS 16, 1990.";
     Tsit5 7 0 TSIT5 "Tsitouras' pair of orders 5 and 4: six evaluations a step. Comput. Math. Appl. 62, 2011.";
-    Dop853 12 3 DOP853 "Dormand and Prince's method of order 8: twelve evaluations a step. Hairer, Nørsett, Wanner, II.5.";
-    Verner9 16 4 VERNER9 "Verner's most efficient pair of orders 9 and 8: sixteen evaluations a step. Numer. Algorithms 53, 2010.";
+    Dop853 12 4 DOP853 "Dormand and Prince's method of order 8: twelve evaluations a step. Hairer, Nørsett, Wanner, II.5.";
+    Verner9 16 5 VERNER9 "Verner's most efficient pair of orders 9 and 8: sixteen evaluations a step. Numer. Algorithms 53, 2010.";
 }
 
 /// Any explicit Runge-Kutta method; take one by its name, [`Rk4`] for example.
@@ -54,9 +54,7 @@ methods! {
 pub struct Explicit<Y: System, T, const S: usize, const X: usize> {
     /// Rates of the stages, the first one that at the start of the step.
     k: [Point<Y>; S],
-    /// A stage's displacement; an estimate of the error.
-    stage: Point<Y>,
-    /// Rates of the extra stages of dense output.
+    /// Rates of the extra stages of dense output; in the last place the displacement of one of them.
     extra: [Point<Y>; X],
     extra_known: bool,
     method: core::marker::PhantomData<T>,
@@ -104,7 +102,6 @@ impl<Y: System, T, const S: usize, const X: usize> FromSystem<Y> for Explicit<Y,
     fn new(system: &Y) -> Self {
         Explicit {
             k: core::array::from_fn(|_| Point::zero(system)),
-            stage: Point::zero(system),
             extra: core::array::from_fn(|_| Point::zero(system)),
             extra_known: false,
             method: core::marker::PhantomData,
@@ -119,12 +116,12 @@ where
     T: Method<S, X>,
 {
     /// Error by the estimators of the tableau: one, or two combined as in DOP853 (Hairer, Nørsett, Wanner, II.10, eq.
-    /// 10.17).
-    fn error(&mut self, h: Y::Scalar, scale: &Point<Y>) -> f64 {
+    /// 10.17). Overwrites `work`.
+    fn error(&self, h: Y::Scalar, scale: &Point<Y>, work: &mut Point<Y>) -> f64 {
         let mut norms = [0.0; 2];
         for (norm_, weights) in norms.iter_mut().zip(T::ERRORS).take(T::TABLEAU.error.len()) {
-            self.stage.combine(h, weights.list(), &self.k);
-            *norm_ = norm(&self.stage, scale);
+            work.combine(h, weights.list(), &self.k);
+            *norm_ = norm(work, scale);
         }
         match T::TABLEAU.error.len() {
             2 => {
@@ -152,15 +149,16 @@ where
 
     /// Extra stages of dense output, after the rate at the end is known.
     fn extend(&mut self, step: &mut Attempt<Y>, system: &mut Y, t: Y::Scalar, h: Y::Scalar, dense: &Dense) {
-        for (i, (c, row)) in dense.c.iter().zip(dense.a).enumerate().take(X) {
-            self.stage.clear();
-            let (known, rest) = self.extra.split_at_mut(i);
+        let Some((stage, extra)) = self.extra.split_last_mut() else { return };
+        for (i, (c, row)) in dense.c.iter().zip(dense.a).enumerate().take(extra.len()) {
+            stage.clear();
+            let (known, rest) = extra.split_at_mut(i);
             let rates = Self::rates_of_rows(&self.k, &step.end, known);
             for (w, k) in row.iter().zip(rates) {
-                self.stage.add(w.get(), k);
+                stage.add(w.get(), k);
             }
-            self.stage.scale(h);
-            step.field.rates(system, t + c.get::<Y::Scalar>() * h, &self.stage, &mut rest[0]);
+            stage.scale(h);
+            step.field.rates(system, t + c.get::<Y::Scalar>() * h, stage, &mut rest[0]);
         }
         self.extra_known = true;
     }
@@ -201,16 +199,17 @@ where
             let (known, rest) = self.k.split_at_mut(i);
             let time = t + T::TABLEAU.c[i].get::<Y::Scalar>() * h;
             let row = (T::STAGES[i].list(), &*known);
-            step.field.stage_rates(system, (time, h), row, &mut self.stage, &mut rest[0]);
+            step.field.stage_rates(system, (time, h), row, &mut step.end, &mut rest[0]);
         }
         step.start_known = true;
         step.delta.combine(h, T::STEP.list(), &self.k);
         self.extra_known = false;
+        let error = scale.map_or(0.0, |scale| self.error(h, scale, &mut step.end));
         if T::TABLEAU.fsal && stages == S {
             step.end.copy_from(&self.k[S - 1]);
             step.end_known = true;
         }
-        Ok(scale.map_or(0.0, |scale| self.error(h, scale)))
+        Ok(error)
     }
 
     fn start(&mut self) -> &mut Point<Y> {
@@ -218,8 +217,7 @@ where
     }
 
     fn accepted(&mut self, step: &mut Attempt<Y>, system: &Y, _h: Y::Scalar) -> bool {
-        step.hand_on(system, &mut self.k[0], &mut self.stage);
-        true
+        step.hand_on(system, &mut self.k[0])
     }
 
     fn interpolate(

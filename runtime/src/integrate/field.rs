@@ -24,10 +24,16 @@ where
     Y::Scalar: Real,
 {
     /// Makes it for one system; `compensated` as in [`Chart::new`].
+    #[inline(always)]
     pub fn new(system: &Y, compensated: bool) -> Self {
-        let (q, p) = (system.neutral(), system.zero_momenta());
-        let chart = Chart::new(system, compensated);
-        Field { chart, qd: q.clone(), q, p, stored: false, evaluations: 0 }
+        Field {
+            chart: Chart::new(system, compensated),
+            q: system.neutral(),
+            p: system.zero_momenta(),
+            qd: system.neutral(),
+            stored: false,
+            evaluations: 0,
+        }
     }
 
     /// Evaluations of the rates so far.

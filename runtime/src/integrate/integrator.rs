@@ -61,12 +61,16 @@ where
         &self.end
     }
 
-    /// Turns the rate at the end of an accepted step into the rate at the start of the next one: `start`. Overwrites
-    /// `work`.
-    pub fn hand_on(&self, system: &Y, start: &mut Point<Y>, work: &mut Point<Y>) {
+    /// Turns the rate at the end of an accepted step, if it is known, into the rate at the start of the next one: `start`. Returns
+    /// whether it was known. It is lost then.
+    pub fn hand_on(&mut self, system: &Y, start: &mut Point<Y>) -> bool {
+        if !core::mem::take(&mut self.end_known) {
+            return false;
+        }
         start.copy_from(&self.end);
-        work.copy_from(&self.delta);
-        Chart::follow(system, &self.delta, work, start);
+        self.end.copy_from(&self.delta);
+        Chart::follow(system, &self.delta, &mut self.end, start);
+        true
     }
 
     /// The error of an implicit step whose matrix has no pivot in a column: the rate at the start shows whether the

@@ -24,12 +24,14 @@ mbd_macros::mbd_model! {
     path = "../../../models/ur5.urdf",
     name = Ur5F32,
     scalar = f32,
+    elimination = fewest,
     outputs = [rates, momenta, energy, derivatives]
 }
 mbd_macros::mbd_model! {
     path = "../../../models/ur5.urdf",
     name = Ur5F64,
     scalar = f64,
+    elimination = fewest,
     outputs = [rates, momenta, energy]
 }
 mbd_macros::mbd_model! {

@@ -387,10 +387,7 @@ where
 
     fn accepted(&mut self, step: &mut Attempt<Y>, system: &Y, _h: Y::Scalar) -> bool {
         self.known = Known::Last;
-        if step.end_known {
-            step.hand_on(system, &mut self.first, &mut self.size);
-        }
-        step.end_known
+        step.hand_on(system, &mut self.first)
     }
 
     fn interpolate(
