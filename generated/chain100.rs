@@ -4225,6 +4225,7 @@ impl Chain100 {
     ///
     /// # Errors
     /// Columns of different lengths; nothing is written then.
+    #[inline]
     pub fn rates_batch(&self, q: [&[f64]; 100], p: [&[f64]; 100], tau: [&[f64]; 100], qd: [&mut [f64]; 100], pd: [&mut [f64]; 100]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         ::multibody::runtime::batch::run::<f64, 8, 100, 100, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
             ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, qd, pd,));
@@ -4413,6 +4414,7 @@ impl ::multibody::runtime::Energetic for Chain100 {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::batch::RatesBatch<f64, 100, 100, 100> for Chain100 {
+    #[inline]
     fn rates_batch(&self, q: [&[f64]; 100], p: [&[f64]; 100], tau: [&[f64]; 100], qd: [&mut [f64]; 100], pd: [&mut [f64]; 100]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         let _ = tau;
         Self::rates_batch(self, q, p, tau, qd, pd)

@@ -5146,6 +5146,7 @@ impl Chain10Planar {
     ///
     /// # Errors
     /// Columns of different lengths; nothing is written then.
+    #[inline]
     pub fn rates_batch(&self, q: [&[f64]; 10], p: [&[f64]; 10], tau: [&[f64]; 10], qd: [&mut [f64]; 10], pd: [&mut [f64]; 10]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         ::multibody::runtime::batch::run::<f64, 8, 10, 10, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
             ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, qd, pd,));
@@ -5401,6 +5402,7 @@ impl ::multibody::runtime::Accelerated for Chain10Planar {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::batch::RatesBatch<f64, 10, 10, 10> for Chain10Planar {
+    #[inline]
     fn rates_batch(&self, q: [&[f64]; 10], p: [&[f64]; 10], tau: [&[f64]; 10], qd: [&mut [f64]; 10], pd: [&mut [f64]; 10]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         let _ = tau;
         Self::rates_batch(self, q, p, tau, qd, pd)

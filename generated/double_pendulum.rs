@@ -1099,6 +1099,7 @@ impl DoublePendulum {
     ///
     /// # Errors
     /// Columns of different lengths; nothing is written then.
+    #[inline]
     pub fn rates_batch(&self, q: [&[f64]; 2], p: [&[f64]; 2], tau: [&[f64]; 2], qd: [&mut [f64]; 2], pd: [&mut [f64]; 2]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         ::multibody::runtime::batch::run::<f64, 8, 2, 2, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
             ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, qd, pd,));
@@ -1415,6 +1416,7 @@ impl ::multibody::runtime::Accelerated for DoublePendulum {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::batch::RatesBatch<f64, 2, 2, 2> for DoublePendulum {
+    #[inline]
     fn rates_batch(&self, q: [&[f64]; 2], p: [&[f64]; 2], tau: [&[f64]; 2], qd: [&mut [f64]; 2], pd: [&mut [f64]; 2]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         let _ = tau;
         Self::rates_batch(self, q, p, tau, qd, pd)

@@ -4587,6 +4587,7 @@ impl Panda {
     ///
     /// # Errors
     /// Columns of different lengths; nothing is written then.
+    #[inline]
     pub fn rates_batch(&self, q: [&[f64]; 8], p: [&[f64]; 8], tau: [&[f64]; 8], qd: [&mut [f64]; 8], pd: [&mut [f64]; 8]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         ::multibody::runtime::batch::run::<f64, 8, 8, 8, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
             ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, qd, pd,));
@@ -4798,6 +4799,7 @@ impl ::multibody::runtime::Accelerated for Panda {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::batch::RatesBatch<f64, 8, 8, 8> for Panda {
+    #[inline]
     fn rates_batch(&self, q: [&[f64]; 8], p: [&[f64]; 8], tau: [&[f64]; 8], qd: [&mut [f64]; 8], pd: [&mut [f64]; 8]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         let _ = tau;
         Self::rates_batch(self, q, p, tau, qd, pd)

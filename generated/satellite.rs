@@ -4293,6 +4293,7 @@ impl Satellite {
     ///
     /// # Errors
     /// Columns of different lengths; nothing is written then.
+    #[inline]
     pub fn rates_batch(&self, q: [&[f64]; 7], p: [&[f64]; 6], tau: [&[f64]; 6], qd: [&mut [f64]; 7], pd: [&mut [f64]; 6]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         ::multibody::runtime::batch::run::<f64, 8, 7, 6, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
             ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, &self.drive_q, &self.drive_v, self.wrenches.as_flattened(), qd, pd,));
@@ -4611,6 +4612,7 @@ impl ::multibody::runtime::Accelerated for Satellite {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::batch::RatesBatch<f64, 7, 6, 6> for Satellite {
+    #[inline]
     fn rates_batch(&self, q: [&[f64]; 7], p: [&[f64]; 6], tau: [&[f64]; 6], qd: [&mut [f64]; 7], pd: [&mut [f64]; 6]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         let _ = tau;
         Self::rates_batch(self, q, p, tau, qd, pd)

@@ -14049,6 +14049,7 @@ impl Solo12 {
     ///
     /// # Errors
     /// Columns of different lengths; nothing is written then.
+    #[inline]
     pub fn rates_batch(&self, q: [&[f64]; 19], p: [&[f64]; 18], tau: [&[f64]; 18], qd: [&mut [f64]; 19], pd: [&mut [f64]; 18]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         ::multibody::runtime::batch::run::<f64, 8, 19, 18, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
             ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, qd, pd,));
@@ -14254,6 +14255,7 @@ impl ::multibody::runtime::Accelerated for Solo12 {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::batch::RatesBatch<f64, 19, 18, 18> for Solo12 {
+    #[inline]
     fn rates_batch(&self, q: [&[f64]; 19], p: [&[f64]; 18], tau: [&[f64]; 18], qd: [&mut [f64]; 19], pd: [&mut [f64]; 18]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         let _ = tau;
         Self::rates_batch(self, q, p, tau, qd, pd)

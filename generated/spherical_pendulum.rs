@@ -2201,6 +2201,7 @@ impl SphericalPendulum {
     ///
     /// # Errors
     /// Columns of different lengths; nothing is written then.
+    #[inline]
     pub fn rates_batch(&self, q: [&[f64]; 5], p: [&[f64]; 4], tau: [&[f64]; 4], qd: [&mut [f64]; 5], pd: [&mut [f64]; 4]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         ::multibody::runtime::batch::run::<f64, 8, 5, 4, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
             ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, qd, pd,));
@@ -2511,6 +2512,7 @@ impl ::multibody::runtime::Accelerated for SphericalPendulum {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::batch::RatesBatch<f64, 5, 4, 4> for SphericalPendulum {
+    #[inline]
     fn rates_batch(&self, q: [&[f64]; 5], p: [&[f64]; 4], tau: [&[f64]; 4], qd: [&mut [f64]; 5], pd: [&mut [f64]; 4]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         let _ = tau;
         Self::rates_batch(self, q, p, tau, qd, pd)

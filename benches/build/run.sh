@@ -21,7 +21,7 @@ crate() {
     # The versions that the project itself is locked to.
     cp "$root/Cargo.lock" "$work/$1/Cargo.lock"
 }
-facade="multibody = { path = \"$root\", default-features = false }"
+facade="multibody = { path = \"$root\" }"
 crate file "mbd-runtime = { path = \"$root/runtime\", features = [\"std\"] }"
 crate macro "$facade"
 crate quick "$facade" $'[profile.dev.build-override]\nopt-level = 3\n[profile.release.build-override]\nopt-level = 3'

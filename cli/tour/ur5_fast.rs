@@ -547,6 +547,7 @@ impl Ur5Fast {
     ///
     /// # Errors
     /// Columns of different lengths; nothing is written then.
+    #[inline]
     pub fn rates_batch(&self, q: [&[f64]; 6], p: [&[f64]; 6], tau: [&[f64]; 6], qd: [&mut [f64]; 6], pd: [&mut [f64]; 6]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         ::multibody::runtime::batch::run::<f64, 8, 6, 6, _>(q, p, tau, qd, pd, |q, p, tau, qd, pd| {
             ::multibody::runtime::kernel::call_lanes::<Self, 0, 8, f64, _>((q, p, tau, qd, pd,));
@@ -672,6 +673,7 @@ impl ::multibody::runtime::System for Ur5Fast {
 
 #[rustfmt::skip]
 impl ::multibody::runtime::batch::RatesBatch<f64, 6, 6, 6> for Ur5Fast {
+    #[inline]
     fn rates_batch(&self, q: [&[f64]; 6], p: [&[f64]; 6], tau: [&[f64]; 6], qd: [&mut [f64]; 6], pd: [&mut [f64]; 6]) -> ::core::result::Result<(), ::multibody::runtime::batch::BatchError> {
         let _ = tau;
         Self::rates_batch(self, q, p, tau, qd, pd)

@@ -121,7 +121,8 @@ pub fn call(options: &Options, kernel: &Kernel, lanes: &str, local: &[&str]) -> 
     format!("{rt}::kernel::call_lanes::<Self, {}, {lanes}, {t}, _>({ports});", kernel.id)
 }
 
-/// Rates of any number of states.
+/// Rates of any number of states. What is marked `#[inline]` is compiled where it is called only: the code for lanes takes a
+/// library's compiler as long as that for one state.
 pub fn batch(out: &mut String, plan: &Plan, options: &Options, kernels: &[Kernel]) {
     let (rt, t, width) = (&options.runtime, options.precision.name(), width(options));
     let Some(kernel) = kernels.iter().find(|k| k.signature.name == Output::Rates.name()) else { return };
@@ -137,6 +138,7 @@ pub fn batch(out: &mut String, plan: &Plan, options: &Options, kernels: &[Kernel
     ///
     /// # Errors
     /// Columns of different lengths; nothing is written then.
+    #[inline]
     pub fn rates_batch(&self, {arguments}) -> ::core::result::Result<(), {rt}::batch::BatchError> {{
         {rt}::batch::run::<{t}, {width}, {}, {}, _>(q, p, {given}, qd, pd, |q, p, tau, qd, pd| {{
             {call}
@@ -157,6 +159,7 @@ pub fn batch_trait(out: &mut String, plan: &Plan, options: &Options) {
         "
 #[rustfmt::skip]
 impl {rt}::batch::RatesBatch<{t}, {nq}, {nv}, {nt}> for {name} {{
+    #[inline]
     fn rates_batch(&self, q: [&[{t}]; {nq}], p: [&[{t}]; {nv}], tau: [&[{t}]; {nt}], qd: [&mut [{t}]; {nq}], pd: [&mut [{t}]; {nv}]) -> ::core::result::Result<(), {rt}::batch::BatchError> {{
         let _ = tau;
         Self::rates_batch(self, q, p, {given}qd, pd)

@@ -76,6 +76,26 @@ pub struct FlooredReciprocal {
     pub minus_floor: bool,
 }
 
+/// The operands of an operation, one after the other. In macros, whose crates are not optimised, the standard library's adapters
+/// would take several times as long.
+#[derive(Clone, Debug)]
+pub struct Operands {
+    /// Those there are come first.
+    list: [Option<Operand>; 3],
+    next: usize,
+}
+
+impl Iterator for Operands {
+    type Item = Operand;
+
+    #[inline]
+    fn next(&mut self) -> Option<Operand> {
+        let operand = *self.list.get(self.next)?;
+        self.next += 1;
+        operand
+    }
+}
+
 impl Op {
     /// Whether it reads a table.
     pub fn looks_up(&self) -> bool {
@@ -86,8 +106,8 @@ impl Op {
     }
 
     /// The operands of the operation.
-    pub fn operands(&self) -> impl Iterator<Item = Operand> {
-        let all = match *self {
+    pub fn operands(&self) -> Operands {
+        let list = match *self {
             Op::Input(_) => [None; 3],
             Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) => [Some(a), Some(b), None],
             Op::Fma(f) => [Some(f.a), Some(f.b), Some(f.c)],
@@ -96,7 +116,7 @@ impl Op {
             #[cfg(feature = "height_fields")]
             Op::LookUp(look) => [Some(Operand::Node(look.at)), None, None],
         };
-        all.into_iter().flatten()
+        Operands { list, next: 0 }
     }
 
     /// The operation with other ids for its nodes.

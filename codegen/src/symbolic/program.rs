@@ -134,7 +134,11 @@ impl Program {
 
     /// One more than the largest node id.
     pub fn width(&self) -> usize {
-        self.steps.iter().map(|(id, ..)| *id as usize + 1).max().unwrap_or(0)
+        let mut width = 0;
+        for (id, ..) in &self.steps {
+            width = width.max(*id as usize + 1);
+        }
+        width
     }
 
     /// Name of a node.
@@ -166,6 +170,9 @@ impl Program {
 
     /// Replaces `−(a − b)` by `b − a` where it is used as a result only.
     pub(crate) fn turn_negated_differences(&mut self) {
+        if !self.outputs.iter().any(|output| matches!(output, ProgramResult::Node(_, true))) {
+            return;
+        }
         let mut turned = vec![false; self.width()];
         for negative in [true, false] {
             for output in &self.outputs {
@@ -178,9 +185,11 @@ impl Program {
         if !turned.contains(&true) {
             return;
         }
-        for operand in self.steps.iter().flat_map(|(_, op, _)| op.operands()) {
-            if let Operand::Node(id) = operand {
-                turned[id as usize] = false;
+        for (_, op, _) in &self.steps {
+            for operand in op.operands() {
+                if let Operand::Node(id) = operand {
+                    turned[id as usize] = false;
+                }
             }
         }
         for (id, op, _) in &mut self.steps {

