@@ -1,4 +1,4 @@
-//! The rest of a tree, of which branches are computed in loops.
+//! The rest of a tree whose branches are computed in loops.
 
 use mbd_runtime::tree::{Bond, Constraint, Cut, Tree, Unknown};
 use mbd_runtime::Scalar;

@@ -76,8 +76,8 @@ pub struct FlooredReciprocal {
     pub minus_floor: bool,
 }
 
-/// The operands of an operation, one after the other. In macros, whose crates are not optimised, the standard library's adapters
-/// would take several times as long.
+/// The operands of an operation, one after the other. A type of its own, because the standard library's adapters are slow in macros,
+/// whose crates are not optimised.
 #[derive(Clone, Debug)]
 pub struct Operands {
     /// Those there are come first.

@@ -37,7 +37,7 @@ pub fn best_plan(terms: &[Arrival]) -> Option<Plan> {
 
 /// The plan in which each term goes to the chain that is free first; `place` is told the chain of each term.
 fn plan(terms: &[Arrival], chains: usize, place: &mut impl FnMut(usize)) -> Plan {
-    // Arrays and plain loops: a search plans half a million sums, in macros without optimisation.
+    // An array and plain loops: a search plans very many sums, in macros without optimisation.
     let mut free = [0; CHAINS];
     let (mut products, mut instructions) = (0, 0);
     for (n, t) in terms.iter().enumerate() {
