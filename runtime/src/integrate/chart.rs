@@ -156,8 +156,8 @@ where
     #[inline(always)]
     pub fn new(system: &Y, compensated: bool) -> Self {
         let mut chart = Chart { q: system.neutral(), p: system.zero_momenta(), carry: Some(Point::zero(system)) };
-        // Taken out and not left out: what is left out has no value that zeros could be written over in one go with all others,
-        // and the parts are built beside the whole.
+        // The compensation is zeroed and then dropped. If it were never made, its bytes would have no value, and the compiler would
+        // build parts of an integrator beside the whole and copy them.
         if !compensated {
             chart.carry = None;
         }
