@@ -78,8 +78,7 @@ pub struct FlooredReciprocal {
 
 /// The operands of an operation, one after the other. A type of its own, because the standard library's adapters are slow in macros,
 /// whose crates are not optimised.
-#[derive(Clone, Debug)]
-pub struct Operands {
+struct Operands {
     /// Those there are come first.
     list: [Option<Operand>; 3],
     next: usize,
@@ -106,7 +105,7 @@ impl Op {
     }
 
     /// The operands of the operation.
-    pub fn operands(&self) -> Operands {
+    pub fn operands(&self) -> impl Iterator<Item = Operand> {
         let list = match *self {
             Op::Input(_) => [None; 3],
             Op::Add(a, b) | Op::Sub(a, b) | Op::Mul(a, b) | Op::Div(a, b) => [Some(a), Some(b), None],

@@ -92,7 +92,8 @@ fn assert_near(what: &str, results: &[f64], expected: &[f64], exact: &impl Fn() 
     if off <= 1e-11 {
         return;
     }
-    let [own, theirs] = [results, expected].map(|found| relative_error(found, &exact(), 1.0));
+    let exact = exact();
+    let [own, theirs] = [results, expected].map(|found| relative_error(found, &exact, 1.0));
     assert!(own <= 3.0 * theirs, "{what} is {off:e} off, {own:e} from exact results and the interpreter {theirs:e}");
 }
 
