@@ -4,7 +4,7 @@ use mbd_codegen::model::{ConstraintKind, Model};
 use mbd_codegen::modes::ModeChoice;
 use mbd_codegen::options::LikeBranches;
 use mbd_codegen::read::{self, Base, ImportOptions};
-use mbd_codegen::{generate::generate_from, search, Arithmetic, Options, Output};
+use mbd_codegen::{generate::generate_from, search, Arithmetic, Options, Output, RolledCode};
 use mbd_runtime::contact::Mode;
 
 /// Files of `models` (none: [`five_bar_legs`] or [`pinned_feet`]), how their roots are connected, and how many of them stand side by
@@ -21,6 +21,7 @@ const SCENES: [(&str, &str, Base, usize); 6] = [
 fn main() {
     let out = std::env::var("OUT_DIR").expect("cargo sets it");
     quadruped(&out);
+    chain_with_legs(&out);
     for (name, file, base, count) in SCENES {
         let (path, text) = match file {
             "" if name == "feet" => ("pinned_feet.toml".to_string(), pinned_feet()),
@@ -123,6 +124,45 @@ fn pinned_feet() -> String {
             "[[frame]]\nname = \"{leg}_foot\"\nbody = \"{lower}\"\nxyz = [0.16, 0, 0]\n\n[[loop]]\nname = \"{leg}_pin\"\n\
              type = \"spherical\"\nbetween = [\"ground\", \"{leg}_foot\"]\n\n"
         );
+    }
+    text
+}
+
+/// The rates of a centipede: its legs one after the other, computed together, and in loops over its links.
+fn chain_with_legs(out: &str) {
+    let model = read::model("centipede.toml", &centipede(), &ImportOptions::default());
+    let model = model.unwrap_or_else(|findings| panic!("{findings}")).model;
+    let model = Model { name: "model".to_string(), ..model };
+    let kinds = [
+        ("apart", RolledCode::Never, LikeBranches::Apart),
+        ("together", RolledCode::Never, LikeBranches::Together),
+        ("rolled", RolledCode::Always, LikeBranches::Apart),
+    ];
+    for (name, rolled, branches) in kinds {
+        let mut options = Options { outputs: vec![Output::Rates], ..Options::default() };
+        (options.plan.rolled, options.plan.branches) = (rolled, branches);
+        let plan = search::plan(&model, options.searches());
+        let code = generate_from(&plan, &options).expect("code").source;
+        std::fs::write(format!("{out}/centipede_{name}.rs"), code).expect("written");
+    }
+}
+
+/// A trunk and a chain of 24 links behind it, which bend up and to the sides in turn, each with a leg of three joints on either side.
+fn centipede() -> String {
+    let mut text = trunk("centipede");
+    let mut behind = "trunk".to_string();
+    for link in 0..24 {
+        let name = format!("link{link}");
+        text += &body(&name, 0.9, -0.11, 0.012);
+        text += &revolute(&name, &behind, [-0.2, 0.0, 0.0], if link % 2 == 0 { [0, 1, 0] } else { [0, 0, 1] });
+        for (side, y) in [("left", 0.05), ("right", -0.05)] {
+            let [hip, upper, lower] = ["hip", "upper", "lower"].map(|part| format!("{part}{link}_{side}"));
+            text += &(body(&hip, 0.15, 0.0, 1e-4) + &body(&upper, 0.14, 0.05, 4e-4) + &body(&lower, 0.03, 0.06, 2e-4));
+            text += &revolute(&hip, &name, [-0.1, y, 0.0], [0, 0, 1]);
+            text += &revolute(&upper, &hip, [0.0, 0.6 * y, 0.0], [1, 0, 0]);
+            text += &revolute(&lower, &upper, [0.0, 3.0 * y, 0.0], [1, 0, 0]);
+        }
+        behind = name;
     }
     text
 }

@@ -5,13 +5,17 @@ use mbd_codegen::model::Model;
 use mbd_codegen::options::PlanOptions;
 use mbd_codegen::{Output, RolledCode};
 
+use crate::branches::{centipede, Numbers};
 use crate::random::{random_model, Distribution, Rng};
 
 /// Number of trees.
-pub const TREES: u64 = 32;
+pub const TREES: u64 = 33;
 
 /// From this index on, the trees are chains with rolled code wherever links repeat.
 pub const FIRST_CHAIN: u64 = 28;
+
+/// A chain whose links have legs, in a loop whose body reads and writes so much that all of it is in one array.
+const CENTIPEDE: u64 = 32;
 
 /// Every fourth tree is generated in single precision.
 pub fn is_single(k: u64) -> bool {
@@ -29,6 +33,9 @@ pub fn has_lanes(k: u64) -> bool {
 /// Derivatives of large trees are left out, because their code grows with the square of the number of velocities.
 fn outputs(k: u64, velocities: usize) -> Vec<Output> {
     let always = [Output::Rates, Output::Momenta, Output::Energy, Output::MassMatrix];
+    if k == CENTIPEDE {
+        return always.to_vec();
+    }
     let in_turn = Output::available(false).filter(|output| !always.contains(output)).enumerate();
     let chosen = in_turn.filter(|(n, output)| {
         let is_large = output.name().ends_with("derivatives") && velocities > 8;
@@ -46,7 +53,10 @@ pub fn tree(k: u64) -> (Model, Options) {
         Some(chain) => (self::chain(chain), RolledCode::Always),
         None => (Distribution::everything(seed, 2 + k as usize % 4), RolledCode::Auto),
     };
-    let model = random_model(seed, &distribution);
+    let model = match k {
+        CENTIPEDE => centipede(4, 4, 3, Numbers::Different),
+        _ => random_model(seed, &distribution),
+    };
     let velocities: usize = model.joints.iter().map(|joint| joint.kind.nv()).sum();
     let options = Options {
         arithmetic: Arithmetic::Exact,

@@ -203,3 +203,34 @@ pub fn tree(seed: u64, numbers: Numbers) -> Model {
     let options = ImportOptions::default();
     read::model("tree.toml", &text, &options).unwrap_or_else(|findings| panic!("{findings}\n{text}")).model
 }
+
+/// A chain of `links` links with like branches, in space: each carries `legs` legs of one to three joints, which stand before the
+/// next link in the description. Numbers differ from link to link; the axes of the joints are alike in all, or in every other link.
+/// A body hangs on the last link.
+///
+/// # Panics
+/// If the reader refuses the text.
+pub fn centipede(seed: u64, links: usize, legs: usize, numbers: Numbers) -> Model {
+    let mut rng = Rng::new(seed, 7);
+    let mut text = format!("name = \"centipede\"\ngravity = [0, 0, -9.81]\n\n{TRUNK}");
+    let length = 1 + rng.below(3);
+    let kinds: Vec<&str> = (0..=length).map(|_| rng.pick(&["revolute", "spherical", "universal"])).collect();
+    let every_other = rng.chance(0.3);
+    let mut parent = "trunk".to_string();
+    for link in 0..links {
+        let name = format!("link{link}");
+        let kind = if every_other && link % 2 == 1 { "cylindrical" } else { kinds[0] };
+        body(&mut text, &name, &parent, kind, &mut rng, [1.0; 3]);
+        for leg in 0..legs {
+            let (mut own, scale) = of_branch(seed + link as u64, leg, numbers);
+            for k in 0..length {
+                let on = if k == 0 { name.clone() } else { format!("leg{link}_{leg}_{}", k - 1) };
+                body(&mut text, &format!("leg{link}_{leg}_{k}"), &on, kinds[k + 1], &mut own, scale);
+            }
+        }
+        parent = name;
+    }
+    body(&mut text, "tail", &parent, "universal", &mut rng, [1.0; 3]);
+    let options = ImportOptions::default();
+    read::model("centipede.toml", &text, &options).unwrap_or_else(|findings| panic!("{findings}\n{text}")).model
+}

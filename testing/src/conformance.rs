@@ -10,6 +10,7 @@ use mbd_codegen::plan::Plan;
 use mbd_codegen::{search, Arithmetic, Options, Output, Precision, RolledCode};
 use mbd_runtime::trig::{sincos_f32, sincos_f64};
 
+use crate::branches::{centipede, NUMBERS};
 use crate::chains::{general, planar};
 use crate::closed::{random_loops, LoopKnobs};
 use crate::fused::{Fused, Number};
@@ -168,7 +169,11 @@ pub fn closed(seed: u64) -> Case {
 /// A random chain, whose programs are rolled wherever links repeat.
 pub fn chain(seed: u64) -> Case {
     let n = 6 + (seed % 7) as usize;
-    let model = if seed.is_multiple_of(2) { general(seed, n) } else { planar(seed, n) };
+    let model = match seed % 4 {
+        3 => centipede(seed, 4 + n % 2, 2, NUMBERS[seed as usize / 4 % 4]),
+        1 => planar(seed, n),
+        _ => general(seed, n),
+    };
     let options = exact(EliminationStrategy::Single, RolledCode::Always);
     let plan = search::plan(&model, options.plan);
     let state = random_state(&plan, seed);

@@ -23,6 +23,7 @@ code!(g1_exact_apart, g1_exact_together, g1_fast_apart, g1_fast_together);
 code!(arms_exact_apart, arms_exact_together, arms_fast_apart, arms_fast_together);
 code!(five_bars_exact_apart, five_bars_exact_together, five_bars_fast_apart, five_bars_fast_together);
 code!(feet_exact_apart, feet_exact_together, feet_fast_apart, feet_fast_together);
+code!(centipede_apart, centipede_together, centipede_rolled);
 code!(quadruped_apart, quadruped_together);
 code!(four_bars_exact_apart, four_bars_exact_together, four_bars_fast_apart, four_bars_fast_together);
 
@@ -159,5 +160,7 @@ fn main() {
         with_contacts();
         compare!("fifty four-bars, fast ", four_bars_fast_apart, four_bars_fast_together, 201);
         compare!("fifty four-bars, exact", four_bars_exact_apart, four_bars_exact_together, 201);
+        compare!("centipede, legs together", centipede_apart, centipede_together, 201);
+        compare!("centipede, loops over links", centipede_apart, centipede_rolled, 201);
     }
 }

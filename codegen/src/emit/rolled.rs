@@ -7,6 +7,7 @@ use std::fmt::Write;
 use super::head::Head;
 use super::names::{heading, Names};
 use super::numbers::{minus, signed};
+use super::straight::LOCATIONS;
 use crate::options::Precision;
 use crate::plan::Plan;
 use crate::rolled::{Block, Loop, Place, Repeat, RolledProgram, Start, Target};
@@ -189,9 +190,13 @@ impl<'a> RolledWriter<'a> {
         let names = Names::default().block(self.plan, &self.program, block, self.head.inputs);
         let angles = Angles::new(&block.program);
         self.angles(out, k, &angles, &names, indent);
-        let given = self.given(out, block, &angles, indent);
         let n = block.outputs.len();
-        if n > 0 {
+        let (given, written) = match self.in_one_array(block, &angles) {
+            true => (self.all_read(out, k, &angles, indent), "all"),
+            false => (self.given(out, block, &angles, indent), "results"),
+        };
+        let first = if written == "all" { given.len() } else { 0 };
+        if n > 0 && written != "all" {
             let _ = writeln!(out, "{indent}let mut results = {};", self.head.rows(n));
         }
         let _ = writeln!(out, "{indent}for l in 0..LANES {{");
@@ -202,7 +207,8 @@ impl<'a> RolledWriter<'a> {
                 Op::Sin(a) | Op::Cos(a) => match angles.early.keys().position(|angle| angle == a) {
                     Some(k) => {
                         let row = if matches!(op, Op::Sin(_)) { "sines" } else { "cosines" };
-                        format!("let {} = {row}[{k}][l];", names[id])
+                        let row = given.get(id).map_or_else(|| format!("{row}[{k}]"), |k| format!("all[{k}]"));
+                        format!("let {} = {row}[l];", names[id])
                     }
                     None => {
                         // The first one of a pair represents both.
@@ -212,7 +218,7 @@ impl<'a> RolledWriter<'a> {
                     }
                 },
                 op => match given.get(id) {
-                    Some(k) => format!("let {} = given[{k}][l];", names[id]),
+                    Some(k) => format!("let {} = {}[{k}][l];", names[id], if first > 0 { "all" } else { "given" }),
                     None => format!("let {} = {};", names[id], self.value(k, op, &names)),
                 },
             };
@@ -223,9 +229,13 @@ impl<'a> RolledWriter<'a> {
             let _ = writeln!(out, "{indent}    {text}");
         }
         for (k, result) in block.program.outputs.iter().enumerate() {
-            let _ = writeln!(out, "{indent}    results[{k}][l] = {};", self.head.value(result, &names));
+            let value = self.head.value(result, &names);
+            let _ = writeln!(out, "{indent}    {written}[{}][l] = {value};", first + k);
         }
         let _ = writeln!(out, "{indent}}}");
+        if n > 0 && written == "all" {
+            let _ = writeln!(out, "{indent}let results = &all[{first}..];");
+        }
         self.results(out, k, indent);
     }
 
@@ -318,6 +328,40 @@ impl<'a> RolledWriter<'a> {
         inputs.iter().enumerate().map(|(k, (id, _))| (*id, k)).collect()
     }
 
+    /// Whether what the loop over lanes of a block reads and writes are rows of one array, as in straight-line code.
+    fn in_one_array(&self, block: &Block, angles: &Angles) -> bool {
+        let read = block.inputs.iter().filter(|place| !matches!(place, Place::Column(_))).count();
+        read + block.outputs.len() + 2 * angles.early.len() > LOCATIONS
+    }
+
+    /// Copies all that the loop over lanes of a block reads to the first rows of an array that has room for the results, too.
+    /// Returns the places in it.
+    fn all_read(&self, out: &mut String, k: usize, angles: &Angles, indent: &str) -> BTreeMap<u32, usize> {
+        let block = &self.program.blocks[k];
+        let angle = |a: &u32| angles.early.keys().position(|angle| angle == a);
+        let copy = |op: &Op, to: usize| match op {
+            Op::Sin(a) => angle(a).map(|k| format!("all[{to}] = sines[{k}];")),
+            Op::Cos(a) => angle(a).map(|k| format!("all[{to}] = cosines[{k}];")),
+            Op::Input(input) => {
+                let place = block.inputs[*input as usize];
+                let given = || Some(format!("for l in 0..LANES {{ all[{to}][l] = {}; }}", self.given_input(place)?));
+                self.row(k, place).map(|row| format!("all[{to}] = {row};")).or_else(given)
+            }
+            _ => None,
+        };
+        let mut places = BTreeMap::new();
+        let mut copies = String::new();
+        for (id, op, _) in block.program.steps.iter().filter(|(id, ..)| angles.after.contains(id)) {
+            if let Some(copy) = copy(op, places.len()) {
+                places.insert(*id, places.len());
+                let _ = writeln!(copies, "{indent}{copy}");
+            }
+        }
+        let _ = writeln!(out, "{indent}let mut all = {};", self.head.rows(places.len() + block.outputs.len()));
+        out.push_str(&copies);
+        places
+    }
+
     /// An input of the function, if the place is one.
     fn given_input(&self, place: Place) -> Option<String> {
         match place {
@@ -358,20 +402,26 @@ impl<'a> RolledWriter<'a> {
 
     fn value(&self, k: usize, op: &Op, names: &BTreeMap<u32, String>) -> String {
         let Op::Input(input) = op else { return self.head.expression(op, names) };
-        let place = self.program.blocks[k].inputs[*input as usize];
-        match place {
-            Place::Kept(slot) => format!("kept[{slot}][l]"),
+        match self.program.blocks[k].inputs[*input as usize] {
             Place::Column(column) => format!("table[{column}]"),
+            place => self.row(k, place).map(|row| format!("{row}[l]")).or(self.given_input(place)).unwrap_or_default(),
+        }
+    }
+
+    /// What a block reads in all lanes, if it is a row of an array.
+    fn row(&self, k: usize, place: Place) -> Option<String> {
+        match place {
+            Place::Kept(slot) => Some(format!("kept[{slot}]")),
             Place::Row(row) => {
                 let run = self.program.blocks[k].run();
                 let from =
                     (0..k).find(|from| self.program.blocks[*from].run() == run && self.kept[*from].contains(&row));
                 let from = from.expect("a row is written before it is read");
                 let at = self.kept[from].iter().position(|kept| *kept == row).unwrap_or(0);
-                format!("row{from}[{at}][l]")
+                Some(format!("row{from}[{at}]"))
             }
-            Place::Carried(k) => format!("carried{k}[l]"),
-            Place::Given(_) | Place::GivenOfTurn { .. } => self.given_input(place).unwrap_or_default(),
+            Place::Carried(k) => Some(format!("carried{k}")),
+            Place::Column(_) | Place::Given(_) | Place::GivenOfTurn { .. } => None,
             Place::RowOfBranch { .. } => unreachable!("like branches have a writer of their own"),
         }
     }

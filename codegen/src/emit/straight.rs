@@ -17,7 +17,7 @@ use crate::symbolic::angles::{nodes, with_operands, Angles, Pairs};
 use crate::symbolic::{Label, Op, Program, ProgramResult};
 
 /// Places in memory that a loop may use: LLVM compares no more than 250 with each other (`alias-set-saturation-threshold`).
-const LOCATIONS: usize = 250;
+pub(super) const LOCATIONS: usize = 250;
 
 /// A program with names for its values and places for its results.
 pub struct Straight<'a> {

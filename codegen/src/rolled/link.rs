@@ -55,6 +55,8 @@ pub struct Link<'g, 'a> {
     given: SymbolicInputs<'g>,
     /// Nodes beside the one that stands for the rest of the tree, if there is one.
     nodes: usize,
+    /// That of them on which the next turn of a chain hangs.
+    exit: usize,
     /// What the graph's inputs are.
     pub inputs: Vec<LinkInput>,
     /// Passes done that carry something.
@@ -106,7 +108,8 @@ impl<'g, 'a> Link<'g, 'a> {
         let stand_in = tree.nodes.first().is_some_and(|node| matches!(node.source, Source::Drive { .. }));
         let nodes = tree.nodes.len() - usize::from(stand_in);
         let stage = PassState::new(group, graph, tree, passes)?;
-        Some(Link { graph, stage, given, nodes, inputs, passes: Vec::new(), size, stride })
+        let exit = run.exit + 1;
+        Some(Link { graph, stage, given, nodes, exit, inputs, passes: Vec::new(), size, stride })
     }
 
     /// A pass, carrying in `first` at its first turn. What is constant there and stays so from turn to turn is a
@@ -175,11 +178,11 @@ impl<'g, 'a> Link<'g, 'a> {
     ) -> Vec<Expr<'g>> {
         let given = &self.given;
         stage.begin(pass, given);
-        let (inner, outer) = (0, self.nodes);
+        let (inner, exit, outer) = (0, self.exit, self.nodes);
         let mut incoming = incoming.iter();
         let mut next = || *incoming.next().expect("a pass takes in as much as it hands on");
         match direction {
-            SweepDirection::TipToBase => stage.carried(pass, outer, given, |e| *e = *e + next()),
+            SweepDirection::TipToBase => stage.carried(pass, exit, given, |e| *e = *e + next()),
             SweepDirection::BaseToTip => stage.carried(pass, inner, given, |e| *e = next()),
         }
         stage.running(pass, given, |e| *e = next());
@@ -190,7 +193,7 @@ impl<'g, 'a> Link<'g, 'a> {
             }
             SweepDirection::BaseToTip => {
                 (1..=outer).for_each(|i| stage.node(pass, i, given));
-                outer
+                exit
             }
         };
         let mut out = read(|visit| stage.carried(pass, last, given, visit));

@@ -16,6 +16,7 @@ mod rest;
 mod runs;
 mod share;
 mod siblings;
+mod side_branches;
 mod sines;
 mod together;
 mod turn_constants;
@@ -24,10 +25,13 @@ mod twins;
 
 use std::collections::BTreeSet;
 
+use mbd_runtime::tree::Tree;
+
 use crate::options::{Options, RolledCode};
 use crate::output::{Output, OutputProgram};
 use crate::plan::{Plan, RowsThatAct};
-use crate::symbolic::{Counts, Label, Program, ProgramResult};
+use crate::symbolic::{Counts, Expr, Graph, Label, Program, ProgramResult};
+use crate::trace::{spec_of, symbolic_tree, SymbolicInputs};
 
 pub use cost::cost;
 pub use mbd_runtime::sweep::pass::SweepDirection;
@@ -219,6 +223,26 @@ impl RolledProgram {
                 outputs_fit && operands.all(&mut fits)
             })
     }
+}
+
+/// Nodes that can be loops over the links of chains whose links have branches, run by run, at least `least` in each.
+pub fn runs_with_side_branches(plan: &Plan, least: usize) -> Vec<std::ops::Range<usize>> {
+    with_tree(plan, |tree| {
+        let runs = find(tree, &vec![true; plan.nodes.len()], least);
+        runs.into_iter().filter(Run::has_side_branches).map(|run| run.nodes).collect()
+    })
+}
+
+/// Whether a body has like branches, which can be computed together.
+pub fn has_like_branches(plan: &Plan) -> bool {
+    with_tree(plan, |tree| !siblings::find(tree, true).is_empty())
+}
+
+/// Calls `f` with the tree of the rates on symbols.
+fn with_tree<T>(plan: &Plan, f: impl FnOnce(&Tree<Expr>) -> T) -> T {
+    let (graph, options) = (Graph::default(), Options { outputs: vec![Output::Rates], ..Options::default() });
+    let given = SymbolicInputs::new(&graph, plan, spec_of(plan, Output::Rates), &options);
+    f(&symbolic_tree(plan, Output::Rates, &given, &options).regrouped())
 }
 
 /// The loop form of a group; `None` where there is none, or straight-line code is better.

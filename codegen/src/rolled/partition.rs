@@ -100,7 +100,8 @@ pub fn assemble<P, T: Copy>(
 
 /// Cuts the graph of a turn.
 pub fn partition(graph: &Graph, link: &Link<'_, '_>, run: &Run, live: &[bool], wanted: &Requests<'_, '_>) -> Code {
-    let ranks = if run.branches.is_some() { ranks_in_branch(graph, link) } else { ranks(graph, link) };
+    let by_itself = run.branches.is_some() || run.has_side_branches();
+    let ranks = if by_itself { ranks_in_branch(graph, link) } else { ranks(graph, link) };
     let passes = link.passes.len();
     let (columns, table) = columns(graph, link, run, (live, &wanted.results), &ranks);
     // Outputs of every pass that leave the turn.
@@ -207,8 +208,8 @@ fn ranks(graph: &Graph, link: &Link<'_, '_>) -> Vec<Rank> {
     ranks
 }
 
-/// The same in a branch, which takes in nothing from others: everything but angles, sines and cosines is computed in
-/// the pass that needs it first.
+/// The same in a branch, and in links that have branches, where much depends on nothing that other turns hand over:
+/// everything but angles, sines and cosines is computed in the pass that needs it first.
 fn ranks_in_branch(graph: &Graph, link: &Link<'_, '_>) -> Vec<Rank> {
     let mut ranks = ranks(graph, link);
     let mut angles = BTreeSet::new();

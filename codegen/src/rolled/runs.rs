@@ -9,15 +9,18 @@ use std::ops::Range;
 use mbd_runtime::spatial::ElementaryTransform;
 use mbd_runtime::tree::{Bond, Constraint, Cut, Elimination, Node, Source, Tree, TreeFrame, Unknown};
 
+use super::side_branches;
 use crate::symbolic::Expr;
 
 /// Links that repeat: `count` times `period` nodes.
 #[derive(Clone, Debug)]
 pub struct Run {
-    /// Nodes, inner first; each hangs on the one before it.
+    /// Nodes, inner first; each hangs on the one before it, unless turns have branches of their own.
     pub nodes: Range<usize>,
     /// Nodes in one turn of the loop.
     pub period: usize,
+    /// The node of a turn on which the next turn hangs, counted from the first node of the turn.
+    pub(super) exit: usize,
     /// One node of the period each: constants common to all turns, and the others as columns of the table.
     pub(super) template: Vec<Node<Slot>>,
     /// Constraints between the nodes of a turn, or between these and the ground, with constants as in the nodes.
@@ -89,9 +92,21 @@ impl Run {
         self.nodes.start + turn * self.period
     }
 
-    /// Outermost node.
+    /// The node of the last turn on which hangs what follows.
     pub fn last(&self) -> usize {
-        self.nodes.end - 1
+        self.nodes.end - self.period + self.exit
+    }
+
+    /// The node of a turn on which its node `k` hangs, counted from the first node; `None` for what comes before the turn.
+    pub fn parent_in_turn(&self, k: usize) -> Option<usize> {
+        self.template[k].parent?.checked_sub(self.nodes.start)
+    }
+
+    /// Whether links of a chain have branches: not every node of a turn hangs on the one before it, or the next turn does
+    /// not hang on the last.
+    pub fn has_side_branches(&self) -> bool {
+        let chained = (1..self.period).all(|k| self.parent_in_turn(k) == Some(k - 1));
+        self.branches.is_none() && !(chained && self.exit + 1 == self.period)
     }
 }
 
@@ -103,19 +118,22 @@ pub fn find(tree: &Tree<Expr>, allowed: &[bool], least: usize) -> Vec<Run> {
     if !tree.wrenches.is_empty() {
         return Vec::new();
     }
-    let links: Vec<Option<Node<f64>>> =
+    let mut links: Vec<Option<Node<f64>>> =
         (0..tree.nodes.len()).map(|i| constant_link(tree, i).filter(|_| allowed[i])).collect();
     let mut children = vec![0; tree.nodes.len()];
-    for parent in tree.nodes.iter().filter_map(|n| n.parent) {
-        children[parent] += 1;
+    let parents: Vec<Option<usize>> = tree.nodes.iter().map(|node| node.parent).collect();
+    parents.iter().copied().flatten().for_each(|parent| children[parent] += 1);
+    let mut runs = side_branches::find(&links, &parents, least);
+    for run in &runs {
+        links[run.nodes.clone()].fill(None);
     }
-    let mut runs = Vec::new();
     let mut at = 0;
     while at < tree.nodes.len() {
         let path = path_from(&links, &children, at);
         in_path(&links, path.clone(), least, &mut runs);
         at = path.end.max(at + 1);
     }
+    runs.sort_by_key(|run| run.nodes.start);
     runs
 }
 
@@ -181,7 +199,7 @@ fn in_path(links: &[Option<Node<f64>>], path: Range<usize>, least: usize, runs: 
     }
     for (nodes, period) in chosen {
         let all: Option<Vec<Node<f64>>> = nodes.clone().map(|i| links[i].clone()).collect();
-        if let Some(run) = all.and_then(|all| tabulate(&all, nodes, period)) {
+        if let Some(run) = all.and_then(|all| tabulate(&all, nodes, (period, period - 1))) {
             runs.push(run);
         }
     }
@@ -242,7 +260,7 @@ pub(super) fn same_joint(a: &Node<f64>, b: &Node<f64>) -> bool {
 }
 
 /// The same structure and zeros and ones in the same places.
-fn alike(a: &Node<f64>, b: &Node<f64>) -> bool {
+pub(super) fn alike(a: &Node<f64>, b: &Node<f64>) -> bool {
     same_joint(a, b)
         && a.place.len() == b.place.len()
         && a.place.iter().zip(&b.place).all(|(a, b)| same_step(a, b))
@@ -250,7 +268,7 @@ fn alike(a: &Node<f64>, b: &Node<f64>) -> bool {
 }
 
 /// The same joint, and one placement is the other with shifts left out.
-fn compatible(a: &Node<f64>, b: &Node<f64>) -> bool {
+pub(super) fn compatible(a: &Node<f64>, b: &Node<f64>) -> bool {
     same_joint(a, b) && merged(&a.place, &b.place).is_some()
 }
 
@@ -288,8 +306,8 @@ fn padded(
     rest.next().is_none().then_some(out)
 }
 
-/// Constants of a run: what is the same in all turns stays a constant, the rest goes into the table.
-fn tabulate(links: &[Node<f64>], nodes: Range<usize>, period: usize) -> Option<Run> {
+/// Constants of a run, of whose turns the period and the node on which the next one hangs are given: what is the same in all turns stays a constant, the rest goes into the table.
+pub(super) fn tabulate(links: &[Node<f64>], nodes: Range<usize>, (period, exit): (usize, usize)) -> Option<Run> {
     let turns = links.len() / period;
     let mut table = vec![Vec::new(); turns];
     let mut template = Vec::new();
@@ -301,7 +319,7 @@ fn tabulate(links: &[Node<f64>], nodes: Range<usize>, period: usize) -> Option<R
             .collect::<Option<Vec<_>>>()?;
         template.push(columns_of(&like, &mut table));
     }
-    Some(Run { nodes, period, template, constraints: Vec::new(), table, branches: None })
+    Some(Run { nodes, period, exit, template, constraints: Vec::new(), table, branches: None })
 }
 
 /// One node of the template from its likes in all turns, each of which has the same steps: constants that differ get

@@ -76,16 +76,25 @@ fn chain<'g>(run: &Run, slot: &mut impl FnMut(Slot) -> Expr<'g>) -> Vec<Node<Exp
     let mut nodes = vec![dummy(false)];
     let (mut q, mut v) = (0, 0);
     for (k, node) in run.template.iter().enumerate() {
-        nodes.push(Node { parent: Some(k), source: Source::State { q, v }, ..map_node(node, &mut *slot) });
+        let parent = Some(run.parent_in_turn(k).map_or(0, |parent| parent + 1));
+        nodes.push(Node { parent, source: Source::State { q, v }, ..map_node(node, &mut *slot) });
         (q, v) = (q + node.kind.nq(), v + node.kind.nv());
     }
     nodes
 }
 
+/// The nodes of a turn of a chain that lie between the turns before and after it, inner first, behind a dummy.
+fn way_through(run: &Run) -> Vec<usize> {
+    let mut way: Vec<usize> =
+        std::iter::successors(Some(run.exit), |k| run.parent_in_turn(*k)).map(|k| k + 1).collect();
+    way.reverse();
+    way
+}
+
 /// A constraint as a turn of a chain sees it: on the path to a frame if all of the run is.
 fn on_path<'g>(constraint: &Constraint<Expr<'_>>, run: &Run) -> Constraint<Expr<'g>> {
     let path = |path: &[usize]| match path.contains(&run.nodes.start) {
-        true => (1..=run.period).collect(),
+        true => way_through(run),
         false => Vec::new(),
     };
     let [path_a, path_b] = match &constraint.bond {

@@ -2,9 +2,10 @@
 
 use super::evaluation::Evaluation;
 use super::LARGEST;
-use crate::options::{EliminationStrategy, PlanOptions, RolledCode};
+use crate::options::{EliminationStrategy, LikeBranches, PlanOptions, RolledCode};
 use crate::output::Output;
 use crate::plan::{is_single_but_for_rows, unbranched_paths, Plan};
+use crate::rolled::{has_like_branches, runs_with_side_branches};
 
 /// Chains from this length on are rolled without a search if their straight-line code is long, because it is then much
 /// slower.
@@ -27,8 +28,13 @@ pub fn lay_out(plan: &mut Plan, options: PlanOptions) {
         (RolledCode::Auto, true) => ALWAYS,
         (RolledCode::Auto, false) => ALWAYS_OTHERWISE,
     };
+    let by_size = (options.rolled, fastest) == (RolledCode::Auto, true) && plan.nodes.len() <= LARGEST;
     let mut long = unbranched_paths(plan, least);
-    if (options.rolled, fastest) == (RolledCode::Auto, true) && plan.nodes.len() <= LARGEST {
+    // In trees that are not too large for it, computing like branches together is faster.
+    if !(by_size && options.branches != LikeBranches::Apart && has_like_branches(plan)) {
+        long.extend(runs_with_side_branches(plan, least).into_iter().map(Vec::from_iter));
+    }
+    if by_size {
         let bytes = |path: &[usize]| Evaluation::new(&plan.branch(path[0]).0, Output::Rates).map(|e| e.cost.bytes);
         long.retain(|path| bytes(path).is_none_or(|bytes| bytes > LONG));
     }

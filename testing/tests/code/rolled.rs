@@ -4,12 +4,13 @@
 //! tree.
 
 use mbd_codegen::generate::trace;
-use mbd_codegen::model::{Constraint, ConstraintKind, LoopKind, Model, Mount, Placement, Rotation, Value};
+use mbd_codegen::model::{Constraint, ConstraintKind, Joint, LoopKind, Model, Mount, Placement, Rotation, Value};
 use mbd_codegen::options::{EliminationStrategy, PlanOptions};
 use mbd_codegen::rolled::rolled;
 use mbd_codegen::search;
 use mbd_codegen::{Arithmetic, Options, Output, RolledCode};
 use mbd_runtime::Constrained;
+use mbd_testing::branches::{centipede, NUMBERS};
 use mbd_testing::chains::{general, planar};
 use mbd_testing::random::{random_model, Distribution, Rng};
 use mbd_testing::state::random_state;
@@ -173,6 +174,44 @@ fn closed_chains() {
         }
         assert!(nodes + 2 >= n, "seed {seed}: {nodes} of {n} nodes are rolled");
         options.arithmetic = Arithmetic::Fast;
+        compare(&model, seed, &options);
+    }
+}
+
+/// Chains whose links have legs: a turn of the loop is one link with its legs, or two.
+#[test]
+fn centipedes() {
+    for seed in 0..24 {
+        let (links, legs) = (6 + seed as usize % 4, 1 + seed as usize % 3);
+        let model = centipede(seed, links, legs, NUMBERS[seed as usize % 4]);
+        let mut options = forced(seed);
+        // Only joints that are eliminated one by one are in loops.
+        options.plan.elimination = EliminationStrategy::Single;
+        let nodes = compare(&model, seed, &options);
+        // The first link hangs on another kind of joint, and where every other link is alike, one stays apart at the end.
+        let least = (links - 2) * (model.joints.len() / links);
+        assert!(nodes >= least, "seed {seed}: {nodes} of {} nodes are rolled", model.joints.len());
+        options.arithmetic = Arithmetic::Fast;
+        compare(&model, seed, &options);
+    }
+}
+
+/// What hangs on a leg or twice on the last link ends the run of links before it.
+#[test]
+fn centipedes_with_other_ends() {
+    let options = forced(0);
+    for seed in 0..8 {
+        let mut model = centipede(seed, 5, 2, NUMBERS[seed as usize % 4]);
+        let joints = model.joints.len();
+        let last = model.joints[joints - 1].clone();
+        let parent = match seed % 2 {
+            0 => last.parent,
+            _ => Some(model.joints[joints - 2].child),
+        };
+        let mut body = model.bodies[last.child].clone();
+        body.name = "end".to_string();
+        model.bodies.push(body);
+        model.joints.push(Joint { name: "j_end".to_string(), child: model.bodies.len() - 1, parent, ..last });
         compare(&model, seed, &options);
     }
 }

@@ -125,5 +125,6 @@ fn run(tree: &Tree<Expr>, parent: Option<usize>, like: &[Branch], turns: bool) -
         accumulates: parent.is_some_and(|p| tree.nodes[p].elimination.accumulates_momentum),
     };
     let nodes = first.root..first.root + first.nodes.len();
-    Some(Run { period: nodes.len(), nodes, template, constraints, table, branches: Some(branches) })
+    let period = nodes.len();
+    Some(Run { period, exit: period - 1, nodes, template, constraints, table, branches: Some(branches) })
 }
