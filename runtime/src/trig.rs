@@ -32,7 +32,7 @@ mod bits;
 mod number;
 
 use crate::kernel::{call_lanes, Arithmetic, Kernel, Plain};
-use bits::{chunk32, chunk64};
+use bits::{chunk32, chunk64, exact_f32, exact_f64};
 pub use bits::{QUARTER_PI, TWO_OVER_PI};
 use number::In;
 pub use number::Number;
@@ -66,7 +66,7 @@ macro_rules! sincos {
         $(#[$path_doc:meta])* path $path:ident;
         $(#[$reduced_doc:meta])* reduced $reduced:ident;
         $(#[$kernel_doc:meta])* kernel $kernel:ident;
-        parts $fast:ident, $slow:ident, $large:ident, $repair:ident, $block:ident, $flat:ident
+        parts $fast:ident, $slow:ident, $far:ident, $exact:ident, $large:ident, $repair:ident, $block:ident, $flat:ident
     ) => {
         $(#[$doc])*
         #[inline]
@@ -102,10 +102,21 @@ macro_rules! sincos {
         $(#[$pair_doc])*
         #[inline(always)]
         pub fn $pair<A: Arithmetic>(x: $float) -> ($float, $float) {
-            if $large(x) {
-                $slow(x)
-            } else {
-                $fast::<A>(x)
+            // One kernel for both ways: small processors have little memory. In double precision this would take seven more
+            // instructions on the main path.
+            if size_of::<$float>() == 4 && !VECTORS && !A::FUSED {
+                let number = In::<Plain, $float>::new;
+                let (mut y0, mut y1, mut quadrant) = $reduced(number(x));
+                if $large(x) {
+                    let far = $far(x);
+                    (y0, y1, quadrant) = (number(far.0), number(far.1), far.2);
+                }
+                let (sin, cos) = $kernel(y0, y1, quadrant);
+                return (sin.number, cos.number);
+            }
+            match $large(x) {
+                true => $slow(x),
+                false => $fast::<A>(x),
             }
         }
 
@@ -289,17 +300,27 @@ macro_rules! sincos {
             N::turned(quadrant, sin, cos)
         }
 
-        /// Payne–Hanek reduction for `x` beyond the main path; NaN for infinities and NaN.
+        /// Sine and cosine of `x` beyond the main path; NaN for infinities and NaN.
         #[cold]
         #[inline(never)]
         fn $slow(x: $float) -> ($float, $float) {
+            let (y0, y1, quadrant) = $far(x);
+            let (sin, cos) = $kernel(In::<Plain, $float>::new(y0), In::new(y1), quadrant);
+            (sin.number, cos.number)
+        }
+
+        /// Payne–Hanek reduction for `x` beyond the main path: `y0`, `y1` and the quadrant as those of the main path; NaN for
+        /// infinities and NaN.
+        #[cold]
+        #[inline(never)]
+        fn $far(x: $float) -> ($float, $float, $uint) {
             const BITS: u32 = $uint::BITS;
             const MANT: u32 = $mant; // stored bits
             const BIAS: u32 = (1 << (BITS - 2 - MANT)) - 1;
             let magnitude = x.to_bits() & ($uint::MAX >> 1);
             let biased = (magnitude >> MANT) as u32;
             if biased > 2 * BIAS {
-                return (<$float>::NAN, <$float>::NAN);
+                return (<$float>::NAN, <$float>::NAN, 0);
             }
             let m = (magnitude & ((1 << MANT) - 1)) | (1 << MANT);
             // x = m · 2^e. Bits of 2/π with a value of 4·2^-e or more only add full turns. The window starts after them
@@ -312,26 +333,32 @@ macro_rules! sincos {
             let mid = $wide::from(m).wrapping_mul(word(1)).wrapping_add(low >> BITS);
             let high = $wide::from(m).wrapping_mul(word(0)).wrapping_add(mid >> BITS) as $uint;
             // The first two bits are the quadrant; the rest is the fraction of a quadrant, as a signed number around
-            // the nearest.
+            // the nearest, of two words.
             let quadrant = high >> (BITS - 2);
-            let fraction = ($wide::from(high) << (BITS + 2)) | ((mid as $uint as $wide) << 2) | ((low as $uint >> (BITS - 2)) as $wide);
-            let negative = fraction >> (2 * BITS - 1) != 0;
-            let fraction = if negative { fraction.wrapping_neg() } else { fraction };
-            // No float is so close to a multiple of π/2 that fewer than BITS significant bits remain.
-            let zeros = fraction.leading_zeros();
-            let leading = (fraction.wrapping_shl(zeros) >> BITS) as $uint;
+            let (mid, low) = (mid as $uint, low as $uint);
+            let (fraction, rest) = ((high << 2) | (mid >> (BITS - 2)), (mid << 2) | (low >> (BITS - 2)));
+            let negative = fraction >> (BITS - 1) != 0;
+            let flip = if negative { $uint::MAX } else { 0 };
+            let (rest, carry) = (rest ^ flip).overflowing_add($uint::from(negative));
+            let fraction = (fraction ^ flip).wrapping_add($uint::from(carry));
+            // No float is so close to a multiple of π/2 that the first word is zero.
+            let zeros = (fraction | 1).leading_zeros();
+            let leading = (fraction << zeros) | (rest >> 1 >> (BITS - 1 - zeros));
             let angle = (($wide::from(leading) * $wide::from((QUARTER_PI >> (64 - BITS)) as $uint)) >> BITS) as $uint;
             // angle · 2^(1 − BITS − zeros) radians, split into two floats exactly.
             let scale = <$float>::from_bits($uint::from((BIAS + 1).wrapping_sub(BITS).wrapping_sub(zeros) as u16) << MANT);
             let rest: $uint = angle & ((1 << (BITS - MANT - 1)) - 1);
-            let (big, small) = ((angle - rest) as $float * scale, rest as $float * scale);
+            let (big, small) = ($exact(angle - rest) * scale, $exact(rest) * scale);
             let y0 = big + small;
             let y1 = (big - y0) + small;
             let quadrant = quadrant.wrapping_add($uint::from(negative));
-            // The angle's sign, then that of x: the sine is odd, the cosine even.
-            let (y0, y1) = if negative { (-y0, -y1) } else { (y0, y1) };
-            let (sin, cos) = $kernel(In::<Plain, $float>::new(y0), In::new(y1), quadrant);
-            (if x < 0.0 { -sin.number } else { sin.number }, cos.number)
+            // The sine is odd, the cosine even: an angle of the other sign has another one of the quadrant, too.
+            match (negative, x < 0.0) {
+                (false, false) => (y0, y1, quadrant),
+                (true, false) => (-y0, -y1, quadrant),
+                (false, true) => (-y0, -y1, quadrant.wrapping_neg()),
+                (true, true) => (y0, y1, quadrant.wrapping_neg()),
+            }
         }
     };
 }
@@ -367,7 +394,7 @@ sincos! {
     /// The second part of [`path_f64`]: sine and cosine of `y0 + y1 + quadrant · π/2`, for |y0| up to slightly above π/4.
     /// `y1` is at most some units in the last place of `y0`, except where both are tiny.
     kernel kernel_f64;
-    parts fast_f64, slow_f64, large_f64, repair_f64, block_f64, flat_f64
+    parts fast_f64, slow_f64, far_f64, exact_f64, large_f64, repair_f64, block_f64, flat_f64
 }
 
 sincos! {
@@ -398,7 +425,7 @@ sincos! {
     /// The second part of [`path_f32`]: sine and cosine of `y0 + y1 + quadrant · π/2`, for |y0| up to slightly above π/4.
     /// `y1` is at most some units in the last place of `y0`, except where both are tiny.
     kernel kernel_f32;
-    parts fast_f32, slow_f32, large_f32, repair_f32, block_f32, flat_f32
+    parts fast_f32, slow_f32, far_f32, exact_f32, large_f32, repair_f32, block_f32, flat_f32
 }
 
 #[cfg(test)]

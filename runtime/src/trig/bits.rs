@@ -21,7 +21,21 @@ pub(super) fn chunk32(at: u32) -> u32 {
 }
 
 /// The 64 bits of [`TWO_OVER_PI`] from bit `at` on.
-#[inline]
+#[cfg_attr(feature = "std", inline)]
+// Three copies would be most of the code for large angles on a small processor.
+#[cfg_attr(not(feature = "std"), inline(never))]
 pub(super) fn chunk64(at: u32) -> u64 {
     (u64::from(chunk32(at)) << 32) | u64::from(chunk32(at.wrapping_add(32)))
+}
+
+/// An integer with at most 53 bits between its first and its last one. (A conversion of 64 bits is a function on processors of 32.)
+#[inline]
+pub(super) fn exact_f64(x: u64) -> f64 {
+    f64::from((x >> 32) as u32) * 4_294_967_296.0 + f64::from(x as u32)
+}
+
+/// An integer with at most 24 bits between its first and its last one.
+#[inline]
+pub(super) fn exact_f32(x: u32) -> f32 {
+    x as f32
 }

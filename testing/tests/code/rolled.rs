@@ -183,7 +183,15 @@ fn closed_chains() {
 fn centipedes() {
     for seed in 0..24 {
         let (links, legs) = (6 + seed as usize % 4, 1 + seed as usize % 3);
-        let model = centipede(seed, links, legs, NUMBERS[seed as usize % 4]);
+        let mut model = centipede(seed, links, legs, NUMBERS[seed as usize % 4]);
+        if seed % 3 == 0 {
+            // Columns of the rows at the tail pass through the links, but not through the legs.
+            let at = |x: f64| Placement { xyz: [x, 0.3 - x, 0.1].map(Value::Const), rotation: Rotation::NONE };
+            let tail = model.joints[model.joints.len() - 1].child;
+            let [first, second] = [(Some(tail), 0.2), (None, 0.4)].map(|(body, x)| Mount { body, placement: at(x) });
+            let kind = ConstraintKind::Loop { kind: LoopKind::Spherical, first, second };
+            model.constraints.push(Constraint::new("loop", kind, Value::ZERO));
+        }
         let mut options = forced(seed);
         // Only joints that are eliminated one by one are in loops.
         options.plan.elimination = EliminationStrategy::Single;
