@@ -191,12 +191,15 @@ impl<'a> RolledWriter<'a> {
         let angles = Angles::new(&block.program);
         self.angles(out, k, &angles, &names, indent);
         let n = block.outputs.len();
-        let (given, written) = match self.in_one_array(block, &angles) {
-            true => (self.all_read(out, k, &angles, indent), "all"),
-            false => (self.given(out, block, &angles, indent), "results"),
+        let in_one_array = self.in_one_array(block, &angles);
+        let (copied, [from, to], first) = if in_one_array {
+            let copied = self.copy_all(out, k, &angles, indent);
+            let first = copied.len();
+            (copied, ["all"; 2], first)
+        } else {
+            (self.given(out, block, &angles, indent), ["given", "results"], 0)
         };
-        let first = if written == "all" { given.len() } else { 0 };
-        if n > 0 && written != "all" {
+        if n > 0 && !in_one_array {
             let _ = writeln!(out, "{indent}let mut results = {};", self.head.rows(n));
         }
         let _ = writeln!(out, "{indent}for l in 0..LANES {{");
@@ -207,7 +210,7 @@ impl<'a> RolledWriter<'a> {
                 Op::Sin(a) | Op::Cos(a) => match angles.early.keys().position(|angle| angle == a) {
                     Some(k) => {
                         let row = if matches!(op, Op::Sin(_)) { "sines" } else { "cosines" };
-                        let row = given.get(id).map_or_else(|| format!("{row}[{k}]"), |k| format!("all[{k}]"));
+                        let row = copied.get(id).map_or_else(|| format!("{row}[{k}]"), |k| format!("{from}[{k}]"));
                         format!("let {} = {row}[l];", names[id])
                     }
                     None => {
@@ -217,8 +220,8 @@ impl<'a> RolledWriter<'a> {
                         self.head.sine_and_cosine(pair, &names[a])
                     }
                 },
-                op => match given.get(id) {
-                    Some(k) => format!("let {} = {}[{k}][l];", names[id], if first > 0 { "all" } else { "given" }),
+                op => match copied.get(id) {
+                    Some(k) => format!("let {} = {from}[{k}][l];", names[id]),
                     None => format!("let {} = {};", names[id], self.value(k, op, &names)),
                 },
             };
@@ -230,10 +233,10 @@ impl<'a> RolledWriter<'a> {
         }
         for (k, result) in block.program.outputs.iter().enumerate() {
             let value = self.head.value(result, &names);
-            let _ = writeln!(out, "{indent}    {written}[{}][l] = {value};", first + k);
+            let _ = writeln!(out, "{indent}    {to}[{}][l] = {value};", first + k);
         }
         let _ = writeln!(out, "{indent}}}");
-        if n > 0 && written == "all" {
+        if n > 0 && in_one_array {
             let _ = writeln!(out, "{indent}let results = &all[{first}..];");
         }
         self.results(out, k, indent);
@@ -336,7 +339,7 @@ impl<'a> RolledWriter<'a> {
 
     /// Copies all that the loop over lanes of a block reads to the first rows of an array that has room for the results, too.
     /// Returns the places in it.
-    fn all_read(&self, out: &mut String, k: usize, angles: &Angles, indent: &str) -> BTreeMap<u32, usize> {
+    fn copy_all(&self, out: &mut String, k: usize, angles: &Angles, indent: &str) -> BTreeMap<u32, usize> {
         let block = &self.program.blocks[k];
         let angle = |a: &u32| angles.early.keys().position(|angle| angle == a);
         let copy = |op: &Op, to: usize| match op {

@@ -3,7 +3,8 @@
 //! Straight-line code of a long chain outgrows the instruction cache and takes long to compile. Here every pass of a
 //! group (leaves to base, base to leaves) walks the tree once; where it meets a run, one turn is traced on symbols by
 //! the same steps of the sweeps, and becomes the body of a loop. What a later pass needs of an earlier one is kept in
-//! one row of numbers for each turn. The operations are those of the straight-line form, so the bits are the same.
+//! one row of numbers for each turn. A link may have branches of its own, which are then part of its turn. The operations are
+//! those of the straight-line form, so the bits are the same.
 
 mod build;
 mod cost;

@@ -306,7 +306,8 @@ fn padded(
     rest.next().is_none().then_some(out)
 }
 
-/// Constants of a run, of whose turns the period and the node on which the next one hangs are given: what is the same in all turns stays a constant, the rest goes into the table.
+/// Constants of a run, given the nodes in a turn and which of them the next turn hangs on: what is the same in all turns stays a
+/// constant, the rest goes into the table.
 pub(super) fn tabulate(links: &[Node<f64>], nodes: Range<usize>, (period, exit): (usize, usize)) -> Option<Run> {
     let turns = links.len() / period;
     let mut table = vec![Vec::new(); turns];
