@@ -11,6 +11,7 @@ mod cost;
 mod evaluate;
 mod link;
 mod main_line;
+mod mapped;
 mod partition;
 mod pass_state;
 mod rest;
@@ -228,6 +229,9 @@ impl RolledProgram {
 
 /// Nodes that can be loops over the links of chains whose links have branches, run by run, at least `least` in each.
 pub fn runs_with_side_branches(plan: &Plan, least: usize) -> Vec<std::ops::Range<usize>> {
+    if plan.nodes.len() <= least {
+        return Vec::new();
+    }
     with_tree(plan, |tree| {
         let runs = find(tree, &vec![true; plan.nodes.len()], least);
         runs.into_iter().filter(Run::has_side_branches).map(|run| run.nodes).collect()

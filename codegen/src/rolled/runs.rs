@@ -3,12 +3,14 @@
 //! Links are alike if their joints are of one kind and their placements, inertias and passive elements have zeros and
 //! ones in the same places; a run may repeat two to four different links in turn. Where a branch is not strictly
 //! regular, links are also taken for alike after identity steps and zeros have been let in, if that costs little.
+//! A link may have branches of its own, which are then part of its turn (`side_branches.rs`).
 
 use std::ops::Range;
 
 use mbd_runtime::spatial::ElementaryTransform;
-use mbd_runtime::tree::{Bond, Constraint, Cut, Elimination, Node, Source, Tree, TreeFrame, Unknown};
+use mbd_runtime::tree::{Bond, Constraint, Elimination, Node, Source, Tree, Unknown};
 
+use super::mapped::map_node;
 use super::side_branches;
 use crate::symbolic::Expr;
 
@@ -344,71 +346,4 @@ pub(super) fn slots_of(turns: &[Vec<f64>], table: &mut [Vec<f64>]) -> Vec<Slot> 
         Slot::Column(column)
     };
     (0..turns[0].len()).map(slot).collect()
-}
-
-fn map_steps<A: Copy, B>(steps: &[ElementaryTransform<A>], f: &mut impl FnMut(A) -> B) -> Vec<ElementaryTransform<B>> {
-    let steps = steps.iter().map(|step| match *step {
-        ElementaryTransform::Turn { axis, c, s } => ElementaryTransform::Turn { axis, c: f(c), s: f(s) },
-        ElementaryTransform::Shift { axis, r } => ElementaryTransform::Shift { axis, r: f(r) },
-        ElementaryTransform::Rotate(m) => ElementaryTransform::Rotate(m.map(|row| row.map(&mut *f))),
-    });
-    steps.collect()
-}
-
-/// A constraint with every constant replaced, always in the same order.
-pub(super) fn map_constraint<A: Copy, B>(constraint: &Constraint<A>, f: &mut impl FnMut(A) -> B) -> Constraint<B> {
-    let bond = match &constraint.bond {
-        Bond::Cut(cut) => {
-            let closure = cut.closure.map(&mut *f);
-            let [a, b] =
-                [&cut.a, &cut.b].map(|frame| TreeFrame { node: frame.node, place: map_steps(&frame.place, f) });
-            let (path_a, path_b) = (cut.path_a.clone(), cut.path_b.clone());
-            Bond::Cut(Cut { closure, a, b, path_a, path_b, grounded: cut.grounded })
-        }
-        Bond::Coupling { terms, offset } => {
-            Bond::Coupling { terms: terms.iter().map(|(node, ratio)| (*node, f(*ratio))).collect(), offset: f(*offset) }
-        }
-    };
-    Constraint {
-        bond,
-        slots: constraint.slots.clone(),
-        passes: constraint.passes.clone(),
-        first: constraint.first,
-        entry: constraint.entry,
-        velocities: constraint.velocities.clone(),
-        decay: constraint.decay.map(&mut *f),
-        compliance: constraint.compliance.map(&mut *f),
-        own_axes: constraint.own_axes,
-    }
-}
-
-/// A node with every constant replaced, always in the same order.
-pub(super) fn map_node<A: Copy, B>(node: &Node<A>, f: &mut impl FnMut(A) -> B) -> Node<B> {
-    let place = map_steps(&node.place, f);
-    let passive = node.passive.iter().map(|p| mbd_runtime::tree::Passive {
-        damping: f(p.damping),
-        stiffness: f(p.stiffness),
-        rest: f(p.rest),
-        armature: f(p.armature),
-    });
-    let passive = passive.collect();
-    Node {
-        parent: node.parent,
-        place,
-        kind: node.kind.map(&mut *f),
-        source: node.source,
-        ratio: f(node.ratio),
-        offset: f(node.offset),
-        phase: f(node.phase),
-        quarter: node.quarter,
-        slide: f(node.slide),
-        slides: node.slides,
-        inertia: mbd_runtime::spatial::RigidInertia {
-            mass: f(node.inertia.mass),
-            moment: node.inertia.moment.map(&mut *f),
-            inertia: node.inertia.inertia.map(&mut *f),
-        },
-        passive,
-        elimination: node.elimination.clone(),
-    }
 }

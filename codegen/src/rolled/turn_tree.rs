@@ -6,7 +6,8 @@ use mbd_runtime::tree::{
 };
 use mbd_runtime::Scalar;
 
-use super::runs::{map_constraint, map_node, Branches, Extent, Run, Slot};
+use super::mapped::{map_constraint, map_node};
+use super::runs::{Branches, Extent, Run, Slot};
 use crate::symbolic::Expr;
 
 /// Coordinates, velocities and rows of one turn.

@@ -30,9 +30,11 @@ pub fn lay_out(plan: &mut Plan, options: PlanOptions) {
     };
     let by_size = (options.rolled, fastest) == (RolledCode::Auto, true) && plan.nodes.len() <= LARGEST;
     let mut long = unbranched_paths(plan, least);
+    let with_branches = runs_with_side_branches(plan, least);
     // In trees that are not too large for it, computing like branches together is faster.
-    if !(by_size && options.branches != LikeBranches::Apart && has_like_branches(plan)) {
-        long.extend(runs_with_side_branches(plan, least).into_iter().map(Vec::from_iter));
+    let together = |plan: &Plan| by_size && options.branches != LikeBranches::Apart && has_like_branches(plan);
+    if !with_branches.is_empty() && !together(plan) {
+        long.extend(with_branches.into_iter().map(Vec::from_iter));
     }
     if by_size {
         let bytes = |path: &[usize]| Evaluation::new(&plan.branch(path[0]).0, Output::Rates).map(|e| e.cost.bytes);

@@ -212,14 +212,15 @@ fn centipedes_with_other_ends() {
         let mut model = centipede(seed, 5, 2, NUMBERS[seed as usize % 4]);
         let joints = model.joints.len();
         let last = model.joints[joints - 1].clone();
-        let parent = match seed % 2 {
-            0 => last.parent,
-            _ => Some(model.joints[joints - 2].child),
+        // After the tail, or before it, so that joints stay depth first.
+        let (parent, at) = match seed % 2 {
+            0 => (last.parent, joints),
+            _ => (Some(model.joints[joints - 2].child), joints - 1),
         };
         let mut body = model.bodies[last.child].clone();
         body.name = "end".to_string();
         model.bodies.push(body);
-        model.joints.push(Joint { name: "j_end".to_string(), child: model.bodies.len() - 1, parent, ..last });
+        model.joints.insert(at, Joint { name: "j_end".to_string(), child: model.bodies.len() - 1, parent, ..last });
         compare(&model, seed, &options);
     }
 }

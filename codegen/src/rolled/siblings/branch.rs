@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use mbd_runtime::tree::{Bond, Constraint, Elimination, Node, Source, Tree, Unknown};
 
-use super::super::runs::{map_constraint, map_node, same_joint, Extent};
+use super::super::mapped::{map_constraint, map_node};
+use super::super::runs::{same_joint, Extent};
 use super::steps::{padded, Steps};
 use crate::symbolic::Expr;
 

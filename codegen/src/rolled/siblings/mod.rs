@@ -13,7 +13,8 @@ use mbd_runtime::tree::Tree;
 
 use self::branch::{nodes_of, Branch};
 use self::steps::{union, Steps};
-use super::runs::{columns_of, map_constraint, slots_of, Branches, Run, Slot};
+use super::mapped::map_constraint;
+use super::runs::{columns_of, slots_of, Branches, Run, Slot};
 use crate::symbolic::Expr;
 
 /// Largest number of branches in a set: the lanes of a vector register.
