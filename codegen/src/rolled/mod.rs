@@ -229,7 +229,8 @@ impl RolledProgram {
 
 /// Nodes that can be loops over the links of chains whose links have branches, run by run, at least `least` in each.
 pub fn runs_with_side_branches(plan: &Plan, least: usize) -> Vec<std::ops::Range<usize>> {
-    if plan.nodes.len() <= least {
+    // Loops take in no external wrenches, and a tree of many long paths of these is not made for nothing.
+    if plan.nodes.len() <= least || !plan.wrenches.is_empty() {
         return Vec::new();
     }
     with_tree(plan, |tree| {

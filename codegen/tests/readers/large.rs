@@ -9,8 +9,8 @@ use mbd_codegen::plan::{state_layout, Plan};
 use mbd_codegen::read::{self, ImportOptions};
 use mbd_codegen::search;
 
-/// A comb: a chain of bodies, each with a start, a mimic and a wrench, and a body fixed to it.
-fn text(bodies: usize) -> String {
+/// A comb: a chain of bodies, each with a start, a mimic and perhaps a wrench, and a body fixed to it.
+fn text(bodies: usize, wrenches: bool) -> String {
     let mut text = String::from("name = \"comb\"\n");
     for k in 0..bodies / 3 {
         let parent = if k == 0 { "ground".to_string() } else { format!("a{}", k - 1) };
@@ -23,9 +23,11 @@ fn text(bodies: usize) -> String {
              xyz = [0.2, 0, 0]\nstart = 0.1\n\
              [[joint]]\nname = \"jb{k}\"\ntype = \"revolute\"\nparent = \"a{k}\"\nchild = \"b{k}\"\naxis = [0, 0, 1]\n\
              mimic = {{ joint = \"ja{k}\", ratio = 2 }}\n\
-             [[joint]]\nname = \"jc{k}\"\ntype = \"fixed\"\nparent = \"b{k}\"\nchild = \"c{k}\"\n\
-             [[wrench]]\nbody = \"a{k}\"\n"
+             [[joint]]\nname = \"jc{k}\"\ntype = \"fixed\"\nparent = \"b{k}\"\nchild = \"c{k}\"\n"
         );
+        if wrenches {
+            let _ = writeln!(text, "[[wrench]]\nbody = \"a{k}\"");
+        }
     }
     text
 }
@@ -48,9 +50,18 @@ fn stages(text: &str) -> [Duration; 4] {
 
 #[test]
 fn time_is_proportional_to_size() {
+    proportional_to_size(false);
+}
+
+#[test]
+fn time_is_proportional_to_size_with_a_wrench_on_every_link() {
+    proportional_to_size(true);
+}
+
+fn proportional_to_size(wrenches: bool) {
     const SMALL: usize = 1500;
     const TIMES: u32 = 8;
-    let texts = [text(SMALL), text(SMALL * TIMES as usize)];
+    let texts = [SMALL, SMALL * TIMES as usize].map(|bodies| text(bodies, wrenches));
     let mut best = [[Duration::MAX; 4]; 2];
     // 8 for work in proportion, 64 for its square. A millisecond hides what is too fast to be measured.
     let proportional = |[small, large]: &[[Duration; 4]; 2]| {
