@@ -17,6 +17,12 @@ impl Constant {
         Constant { hi, lo, single: hi as f32 }
     }
 
+    /// The constant with these parts, which were those of one.
+    #[inline]
+    pub(crate) const fn of_parts(hi: f64, lo: f64, single: f32) -> Constant {
+        Constant { hi, lo, single }
+    }
+
     /// Whether it is zero, so that a term with it need not be added.
     #[inline]
     pub const fn is_zero(self) -> bool {

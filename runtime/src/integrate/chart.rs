@@ -15,8 +15,8 @@
 
 use super::combine::{combine, Start};
 use super::lie_joint::normalise;
+use super::weights::Row;
 use super::StepError;
-use crate::constant::Constant;
 use crate::lists::{copy, part, part_mut};
 use crate::system::{LieJoint, Real, System};
 use crate::Scalar;
@@ -74,7 +74,7 @@ impl<Y: System> Point<Y> {
 
     /// `self = h Σ wⱼ k_j` over the pairs `(j, wⱼ)`.
     #[inline]
-    pub fn combine(&mut self, h: Y::Scalar, weights: &[(usize, Constant)], k: &[Self]) {
+    pub(super) fn combine(&mut self, h: Y::Scalar, weights: Row, k: &[Self]) {
         combine([self.x.as_mut(), self.p.as_mut()], None, h, weights, k);
     }
 
@@ -243,13 +243,13 @@ where
         }
     }
 
-    /// State at the displacement `h Σ wⱼ k_j` over the pairs `(j, wⱼ)` in one pass, without the displacement being
+    /// State at the displacement `h Σ wⱼ k_j` in one pass, without the displacement being
     /// stored, for systems all of whose displacements are added.
     #[inline(always)]
     pub(super) fn stage(
         &self,
         h: Y::Scalar,
-        (weights, k): (&[(usize, Constant)], &[Point<Y>]),
+        (weights, k): (Row, &[Point<Y>]),
         q: &mut Y::Coordinates,
         p: &mut Y::Momenta,
     ) {

@@ -1,7 +1,7 @@
 //! Weighted sums of the rates of a step's stages.
 
 use super::chart::Point;
-use crate::constant::Constant;
+use super::weights::Row;
 use crate::system::System;
 use crate::Scalar;
 
@@ -21,7 +21,7 @@ pub(super) struct Start<'a, S> {
 /// vector wider than what was written into it waits until that is in the cache.
 const NARROW: bool = cfg!(target_feature = "avx");
 
-/// `out = start + h Σ wⱼ k_j` over the pairs `(j, wⱼ)`, in one pass: a few coordinates and as many momenta at a time, so
+/// `out = start + h Σ wⱼ k_j`, in one pass: a few coordinates and as many momenta at a time, so
 /// that their sums stay in registers, and by pairs at the end, so that who reads the result as vectors finds vectors.
 /// Every list is as long as its part of `out`: where the compiler cannot know that, there must not be a panic path
 /// either.
@@ -30,7 +30,7 @@ pub(super) fn combine<Y: System>(
     mut out: [&mut [Y::Scalar]; 2],
     start: Option<Start<Y::Scalar>>,
     h: Y::Scalar,
-    weights: &[(usize, Constant)],
+    weights: Row,
     k: &[Point<Y>],
 ) {
     #[cfg(feature = "std")]
@@ -51,7 +51,7 @@ pub(super) fn combine<Y: System>(
 /// small processors, which has no such numbers and would grow by a second copy.
 #[cfg(feature = "std")]
 mod in_vectors {
-    use super::{some, Constant, Point, Start, System};
+    use super::{some, Point, Row, Start, System};
     use crate::kernel::{call_lanes, Arithmetic, Kernel};
 
     /// Doubles of the longest vectors.
@@ -62,7 +62,7 @@ mod in_vectors {
         [&'a mut [<Y as System>::Scalar]; 2],
         Option<Start<'a, <Y as System>::Scalar>>,
         <Y as System>::Scalar,
-        &'a [(usize, Constant)],
+        Row<'a>,
         &'a [Point<Y>],
     );
 
@@ -93,7 +93,7 @@ fn some<Y: System, const N: usize>(
     at: usize,
     start: Option<Start<Y::Scalar>>,
     h: Y::Scalar,
-    weights: &[(usize, Constant)],
+    weights: Row,
     k: &[Point<Y>],
 ) -> bool {
     fn pair<'a, S, const N: usize>([x, p]: Parts<'a, S>, at: usize) -> Option<[&'a [S; N]; 2]> {
@@ -113,7 +113,7 @@ fn some<Y: System, const N: usize>(
     if let Some([cx, cp]) = start.and_then(|start| start.carry).and_then(|carry| pair(carry, at)) {
         (dx, dp) = (*cx, *cp);
     }
-    for &(j, w) in weights {
+    for (j, w) in weights.iter() {
         let Some([kx, kp]) = k.get(j).and_then(|k| pair::<_, N>(k.parts(), at)) else { continue };
         // The compiler does not copy a loop that has this in it: the code of a small processor stays small.
         #[cfg(target_arch = "arm")]

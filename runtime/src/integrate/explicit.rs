@@ -4,22 +4,20 @@ use super::chart::Point;
 use super::integrator::{Attempt, FromSystem, Integrator, Scheme};
 use super::stepper::{hermite, norm};
 use super::tableau::{self, Dense, Tableau};
+use super::weights::{weights, Weights};
 use super::StepError;
-use crate::constant::Constant;
 use crate::system::{Real, System};
 
 /// A method with `S` stages, by name. With `X - 1` more for dense output, if `X` is not zero.
 pub trait Method<const S: usize, const X: usize> {
     /// Coefficients of the method.
     const TABLEAU: &'static Tableau<S>;
-    /// The weights of the stages that are not zero, row by row. These tables are computed at compile time, so that they
-    /// are not in writable memory; where a loop over few stages is unrolled, the weights become operands. Tables of their
-    /// own: the image of a small processor holds those that are read.
-    const STAGES: &'static [Weights<S>; S] = &Weights::rows(&Self::TABLEAU.a);
+    /// The weights of the stages, row by row. Where a loop over few stages is unrolled, they become operands.
+    const STAGES: Weights<S, S> = weights!(&Self::TABLEAU.a);
     /// Those of the step.
-    const STEP: &'static Weights<S> = &Weights::new(&Self::TABLEAU.b);
+    const STEP: Weights<S, 1> = weights!(core::slice::from_ref(&Self::TABLEAU.b));
     /// Those of the error estimates, of which there are two at most.
-    const ERRORS: &'static [Weights<S>; 2] = &Weights::rows(Self::TABLEAU.error);
+    const ERRORS: Weights<S, 2> = weights!(Self::TABLEAU.error);
 }
 
 macro_rules! methods {
@@ -60,44 +58,6 @@ pub struct Explicit<Y: System, T, const S: usize, const X: usize> {
     method: core::marker::PhantomData<T>,
 }
 
-/// Weights that are not zero, with the stages they belong to.
-#[derive(Clone, Copy, Debug)]
-pub struct Weights<const S: usize> {
-    list: [(usize, Constant); S],
-    n: usize,
-}
-
-impl<const S: usize> Weights<S> {
-    const fn new(row: &[Constant; S]) -> Self {
-        let mut out = Weights { list: [(0, Constant::ZERO); S], n: 0 };
-        let mut stage = 0;
-        while stage < S {
-            if !row[stage].is_zero() {
-                out.list[out.n] = (stage, row[stage]);
-                out.n += 1;
-            }
-            stage += 1;
-        }
-        out
-    }
-
-    /// Of as many rows as there are; the others are empty.
-    const fn rows<const N: usize>(rows: &[[Constant; S]]) -> [Self; N] {
-        let mut out = [Weights { list: [(0, Constant::ZERO); S], n: 0 }; N];
-        let mut row = 0;
-        while row < rows.len() {
-            out[row] = Weights::new(&rows[row]);
-            row += 1;
-        }
-        out
-    }
-
-    #[inline]
-    fn list(&self) -> &[(usize, Constant)] {
-        self.list.get(..self.n).unwrap_or(&self.list)
-    }
-}
-
 impl<Y: System, T, const S: usize, const X: usize> FromSystem<Y> for Explicit<Y, T, S, X> {
     fn new(system: &Y) -> Self {
         Explicit {
@@ -119,8 +79,8 @@ where
     /// 10.17). Overwrites `work`.
     fn error(&self, h: Y::Scalar, scale: &Point<Y>, work: &mut Point<Y>) -> f64 {
         let mut norms = [0.0; 2];
-        for (norm_, weights) in norms.iter_mut().zip(T::ERRORS).take(T::TABLEAU.error.len()) {
-            work.combine(h, weights.list(), &self.k);
+        for (row, norm_) in norms.iter_mut().enumerate().take(T::TABLEAU.error.len()) {
+            work.combine(h, T::ERRORS.row(row), &self.k);
             *norm_ = norm(work, scale);
         }
         match T::TABLEAU.error.len() {
@@ -198,11 +158,11 @@ where
         for i in usize::from(step.start_known)..stages {
             let (known, rest) = self.k.split_at_mut(i);
             let time = t + T::TABLEAU.c[i].get::<Y::Scalar>() * h;
-            let row = (T::STAGES[i].list(), &*known);
+            let row = (T::STAGES.row(i), &*known);
             step.field.stage_rates(system, (time, h), row, &mut step.end, &mut rest[0]);
         }
         step.start_known = true;
-        step.delta.combine(h, T::STEP.list(), &self.k);
+        step.delta.combine(h, T::STEP.row(0), &self.k);
         self.extra_known = false;
         let error = scale.map_or(0.0, |scale| self.error(h, scale, &mut step.end));
         if T::TABLEAU.fsal && stages == S {

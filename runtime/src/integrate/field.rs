@@ -1,8 +1,8 @@
 //! A mechanism as an ordinary differential equation in local coordinates.
 
 use super::chart::{Chart, Point};
+use super::weights::Row;
 use super::StepError;
-use crate::constant::Constant;
 use crate::system::{Real, System};
 
 /// The rates of a system in the chart about a state, and the number of their evaluations.
@@ -109,14 +109,14 @@ where
         self.evaluate(system, t, point, out);
     }
 
-    /// Rates at time `t` (s) and the displacement `h Σ wⱼ k_j` over the pairs `(j, wⱼ)`. Overwrites `stage`, where the
+    /// Rates at time `t` (s) and the displacement `h Σ wⱼ k_j`. Overwrites `stage`, where the
     /// displacement is stored if it takes more than addition to reach the state there.
     #[inline(always)]
     pub(super) fn stage_rates(
         &mut self,
         system: &mut Y,
         (t, h): (Y::Scalar, Y::Scalar),
-        (weights, k): (&[(usize, Constant)], &[Point<Y>]),
+        (weights, k): (Row, &[Point<Y>]),
         stage: &mut Point<Y>,
         out: &mut Point<Y>,
     ) {

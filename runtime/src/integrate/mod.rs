@@ -58,6 +58,7 @@ mod semi_implicit;
 mod solver;
 mod stepper;
 pub mod tableau;
+mod weights;
 
 pub use crate::constant::{decimal, ratio, Constant};
 pub use crate::error::StepError;
