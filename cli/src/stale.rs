@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use multibody::codegen::options::{EliminationStrategy, PlanOptions, RowElimination, DEFAULT_SNAP};
+use multibody::codegen::options::{AngleRange, EliminationStrategy, PlanOptions, RowElimination, DEFAULT_SNAP};
 use multibody::codegen::read::{Base, ImportOptions};
 use multibody::codegen::{self, Arithmetic, LikeBranches, Options, Output, Precision, RolledCode};
 use serde::Deserialize;
@@ -38,6 +38,7 @@ struct Entry {
     gravity: Option<[f64; 3]>,
     scalar: Option<String>,
     arithmetic: Option<String>,
+    angles: Option<String>,
     #[serde(alias = "forms")]
     elimination: Option<String>,
     #[serde(alias = "loops")]
@@ -97,7 +98,7 @@ fn read(path: &Path) -> Outcome<Manifest> {
 }
 
 const KEYS: &str = "a manifest has `runtime` and [[file]] tables with `file`, `model`, `type`, `outputs`, and perhaps \
-                    `base`, `gravity`, `scalar`, `arithmetic`, `elimination`, `rolled`, `branches`, `rows`, `efforts`, `frames`, `snap`, `chunk`, `modes`";
+                    `base`, `gravity`, `scalar`, `arithmetic`, `angles`, `elimination`, `rolled`, `branches`, `rows`, `efforts`, `frames`, `snap`, `chunk`, `modes`";
 
 /// The text that a file should have.
 fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> Outcome<String> {
@@ -118,6 +119,7 @@ fn content(directory: &Path, manifest: &Path, entry: &Entry, runtime: &str) -> O
         outputs: entry.outputs.iter().map(group).collect::<Outcome<_>>()?,
         precision: choice("scalar", &entry.scalar, Precision::from_name).map_err(wrong)?,
         arithmetic: choice("arithmetic", &entry.arithmetic, Arithmetic::from_name).map_err(wrong)?,
+        angles: choice("angles", &entry.angles, AngleRange::from_name).map_err(wrong)?,
         efforts: entry.efforts.unwrap_or(true),
         frames: entry.frames.clone().unwrap_or_default(),
         plan: PlanOptions {

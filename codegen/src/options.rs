@@ -39,6 +39,17 @@ choice! {
 }
 
 choice! {
+    /// Angles that the generated code is for.
+    pub enum AngleRange {
+        /// Every finite angle.
+        Any = "any",
+        /// Angles of at most 10⁶ rad in double precision, 1600 rad in single precision: less code, and results that are not
+        /// numbers beyond, which steps of integration report.
+        Bounded = "bounded",
+    }
+}
+
+choice! {
     /// Where the generator writes rolled code (loops over like links).
     pub enum RolledCode {
         /// For runs of like links that are long enough to be faster, branch by branch.
@@ -158,6 +169,8 @@ pub struct Options {
     pub chunk: usize,
     /// Whether operations may be rewritten.
     pub arithmetic: Arithmetic,
+    /// Angles that the code is for, in Rust and C.
+    pub angles: AngleRange,
     /// The modes of contacts for which code is made; without them, contacts are no part of the code.
     pub modes: Option<ModeChoice>,
 }
@@ -209,6 +222,7 @@ impl Default for Options {
             source: String::new(),
             chunk: 1000,
             arithmetic: Arithmetic::default(),
+            angles: AngleRange::default(),
             modes: None,
         }
     }

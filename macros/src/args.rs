@@ -1,6 +1,6 @@
 //! Arguments of the macro: `key = value` pairs, each parsed separately, so that all errors are reported at once.
 
-use mbd_codegen::options::{EliminationStrategy, RowElimination};
+use mbd_codegen::options::{AngleRange, EliminationStrategy, RowElimination};
 use mbd_codegen::read::Base;
 use mbd_codegen::words::{did_you_mean, list, quote};
 use mbd_codegen::{Arithmetic, LikeBranches, Options, Output, Precision, RolledCode};
@@ -84,7 +84,7 @@ pub enum Modes {
     Listed(String),
 }
 
-const KEYS: [&str; 21] = [
+const KEYS: [&str; 22] = [
     "path",
     "name",
     "variant",
@@ -92,6 +92,7 @@ const KEYS: [&str; 21] = [
     "outputs",
     "scalar",
     "arithmetic",
+    "angles",
     "elimination",
     "rolled",
     "branches",
@@ -197,6 +198,7 @@ impl Args {
             "arithmetic" => {
                 self.options.arithmetic = choice("arithmetic", value, &Arithmetic::ALL.map(|a| (a.name(), a)))?;
             }
+            "angles" => self.options.angles = choice(&word, value, &AngleRange::ALL.map(|a| (a.name(), a)))?,
             "from" => self.from = from(value)?,
             "elimination" => {
                 let choices = EliminationStrategy::ALL.map(|e| (e.name(), e));

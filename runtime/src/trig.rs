@@ -23,6 +23,9 @@
 //! Larger arguments use the reduction of Payne and Hanek: only the bits of 2/π that contribute to `x · 2/π mod 4` are
 //! multiplied, as integers.
 //!
+//! Code for bounded angles ([`bounded_pairs_f64`]) has the main path alone and gives NaN beyond it: a small processor then keeps
+//! no reduction that it never needs.
+//!
 //! The largest errors that the tests of this module find over random and difficult arguments, plain and fused, are 0.80
 //! units in the last place for `f64` and 0.82 for `f32`.
 // fdlibm's digits are kept as printed there, and 2/π is one rounded constant among several.
@@ -63,10 +66,13 @@ macro_rules! sincos {
         $(#[$slice_doc:meta])* slice $slice:ident, $kernel_type:ident;
         $(#[$pair_doc:meta])* pair $pair:ident;
         $(#[$pairs_doc:meta])* pairs $pairs:ident;
+        $(#[$bounded_pair_doc:meta])* bounded pair $bounded_pair:ident;
+        $(#[$bounded_pairs_doc:meta])* bounded pairs $bounded_pairs:ident;
         $(#[$path_doc:meta])* path $path:ident;
         $(#[$reduced_doc:meta])* reduced $reduced:ident;
         $(#[$kernel_doc:meta])* kernel $kernel:ident;
-        parts $fast:ident, $slow:ident, $far:ident, $exact:ident, $large:ident, $repair:ident, $block:ident, $flat:ident
+        parts $fast:ident, $slow:ident, $far:ident, $exact:ident, $large:ident, $repair:ident, $block:ident, $flat:ident,
+            $one:ident, $several:ident
     ) => {
         $(#[$doc])*
         #[inline]
@@ -78,8 +84,8 @@ macro_rules! sincos {
         #[inline]
         pub fn $lanes<const N: usize>(x: [$float; N]) -> ([$float; N], [$float; N]) {
             let (mut sin, mut cos) = ([0.0; N], [0.0; N]);
-            if $flat::<Plain>(&x, &mut sin, &mut cos) {
-                $repair(&x, &mut sin, &mut cos);
+            if $flat::<Plain, false>(&x, &mut sin, &mut cos) {
+                $repair::<false>(&x, &mut sin, &mut cos);
             }
             (sin, cos)
         }
@@ -93,8 +99,8 @@ macro_rules! sincos {
         impl Kernel<0, $width, (&[$float], &mut [$float], &mut [$float])> for $kernel_type {
             #[inline(always)]
             fn run<A: Arithmetic>((x, sin, cos): (&[$float], &mut [$float], &mut [$float])) {
-                if $flat::<A>(x, sin, cos) {
-                    $repair(x, sin, cos);
+                if $flat::<A, false>(x, sin, cos) {
+                    $repair::<false>(x, sin, cos);
                 }
             }
         }
@@ -102,6 +108,24 @@ macro_rules! sincos {
         $(#[$pair_doc])*
         #[inline(always)]
         pub fn $pair<A: Arithmetic>(x: $float) -> ($float, $float) {
+            $one::<A, false>(x)
+        }
+
+        $(#[$bounded_pair_doc])*
+        #[inline(always)]
+        pub fn $bounded_pair<A: Arithmetic>(x: $float) -> ($float, $float) {
+            $one::<A, true>(x)
+        }
+
+        /// One angle; if it is beyond the main path and angles are `BOUNDED`, NaN.
+        #[inline(always)]
+        fn $one<A: Arithmetic, const BOUNDED: bool>(x: $float) -> ($float, $float) {
+            if BOUNDED {
+                return match $large(x) {
+                    true => (<$float>::NAN, <$float>::NAN),
+                    false => $fast::<A>(x),
+                };
+            }
             // One kernel for both ways: small processors have little memory. In double precision this would take seven more
             // instructions on the main path.
             if size_of::<$float>() == 4 && !VECTORS && !A::FUSED {
@@ -125,13 +149,39 @@ macro_rules! sincos {
         pub fn $pairs<A: Arithmetic, const L: usize, const N: usize>(
             x: &[[$float; L]; N],
         ) -> ([[$float; L]; N], [[$float; L]; N]) {
-            // Without vectors, any numbers that are at hand: a small processor would call a function to write zeros.
-            let start = if VECTORS { [[0.0; L]; N] } else { *x };
-            let (mut sin, mut cos) = (start, start);
-            if $flat::<A>(x.as_flattened(), sin.as_flattened_mut(), cos.as_flattened_mut()) {
+            $several::<A, false, L, N>(x)
+        }
+
+        $(#[$bounded_pairs_doc])*
+        #[inline(always)]
+        pub fn $bounded_pairs<A: Arithmetic, const L: usize, const N: usize>(
+            x: &[[$float; L]; N],
+        ) -> ([[$float; L]; N], [[$float; L]; N]) {
+            $several::<A, true, L, N>(x)
+        }
+
+        /// Several angles, as [`$one`] is for one.
+        #[inline(always)]
+        fn $several<A: Arithmetic, const BOUNDED: bool, const L: usize, const N: usize>(
+            x: &[[$float; L]; N],
+        ) -> ([[$float; L]; N], [[$float; L]; N]) {
+            if !VECTORS {
+                // Sines take the places of the angles, and cosines start as any numbers that are at hand: a small processor has
+                // little memory, and would call a function to write zeros.
+                let (mut sin, mut cos) = (*x, *x);
+                for (s, c) in sin.as_flattened_mut().iter_mut().zip(cos.as_flattened_mut()) {
+                    // The compiler does not copy a loop that has this in it.
+                    #[cfg(target_arch = "arm")]
+                    core::hint::black_box(());
+                    (*s, *c) = $one::<A, BOUNDED>(*s);
+                }
+                return (sin, cos);
+            }
+            let (mut sin, mut cos) = ([[0.0; L]; N], [[0.0; L]; N]);
+            if $flat::<A, BOUNDED>(x.as_flattened(), sin.as_flattened_mut(), cos.as_flattened_mut()) {
                 // Copies are lent, so that the arrays of the main path can stay in registers.
                 let (x, mut s, mut c) = (*x, sin, cos);
-                $repair(x.as_flattened(), s.as_flattened_mut(), c.as_flattened_mut());
+                $repair::<BOUNDED>(x.as_flattened(), s.as_flattened_mut(), c.as_flattened_mut());
                 (sin, cos) = (s, c);
             }
             (sin, cos)
@@ -140,10 +190,10 @@ macro_rules! sincos {
         /// The main path: blocks as wide as the widest vectors, then the rest in narrower blocks. Returns whether an
         /// angle is beyond the main path.
         #[inline(always)]
-        fn $flat<A: Arithmetic>(x: &[$float], sin: &mut [$float], cos: &mut [$float]) -> bool {
+        fn $flat<A: Arithmetic, const BOUNDED: bool>(x: &[$float], sin: &mut [$float], cos: &mut [$float]) -> bool {
             if !VECTORS {
                 for ((x, s), c) in x.iter().zip(sin).zip(cos) {
-                    (*s, *c) = $pair::<A>(*x);
+                    (*s, *c) = $one::<A, BOUNDED>(*x);
                 }
                 return false;
             }
@@ -183,13 +233,13 @@ macro_rules! sincos {
             beyond.iter().fold(false, |any, x| any | x)
         }
 
-        /// Computes the angles beyond the main path again.
+        /// Computes the angles beyond the main path again: NaN where angles are `BOUNDED`.
         #[cold]
         #[inline(never)]
-        fn $repair(x: &[$float], sin: &mut [$float], cos: &mut [$float]) {
+        fn $repair<const BOUNDED: bool>(x: &[$float], sin: &mut [$float], cos: &mut [$float]) {
             for ((x, s), c) in x.iter().zip(sin).zip(cos) {
                 if $large(*x) {
-                    (*s, *c) = $slow(*x);
+                    (*s, *c) = if BOUNDED { (<$float>::NAN, <$float>::NAN) } else { $slow(*x) };
                 }
             }
         }
@@ -387,6 +437,10 @@ sincos! {
     pair pair_f64;
     /// Sines and cosines of `N` angles, radians, in each of `L` lanes; for kernels.
     pairs pairs_f64;
+    /// [`pair_f64`] for code without the reduction of larger angles: NaN beyond [`LIMIT_F64`].
+    bounded pair bounded_pair_f64;
+    /// [`pairs_f64`] for code without the reduction of larger angles: NaN beyond [`LIMIT_F64`].
+    bounded pairs bounded_pairs_f64;
     /// The main path on numbers of any kind, for |x| up to [`LIMIT_F64`]: the sine and cosine of `x`, rad.
     path path_f64;
     /// The first part of [`path_f64`]: `y0`, `y1` and the quadrant, with `x = y0 + y1 + quadrant · π/2`.
@@ -394,7 +448,8 @@ sincos! {
     /// The second part of [`path_f64`]: sine and cosine of `y0 + y1 + quadrant · π/2`, for |y0| up to slightly above π/4.
     /// `y1` is at most some units in the last place of `y0`, except where both are tiny.
     kernel kernel_f64;
-    parts fast_f64, slow_f64, far_f64, exact_f64, large_f64, repair_f64, block_f64, flat_f64
+    parts fast_f64, slow_f64, far_f64, exact_f64, large_f64, repair_f64, block_f64, flat_f64,
+        one_f64, several_f64
 }
 
 sincos! {
@@ -418,6 +473,10 @@ sincos! {
     pair pair_f32;
     /// Sines and cosines of `N` angles, radians, in each of `L` lanes; for kernels.
     pairs pairs_f32;
+    /// [`pair_f32`] for code without the reduction of larger angles: NaN beyond [`LIMIT_F32`].
+    bounded pair bounded_pair_f32;
+    /// [`pairs_f32`] for code without the reduction of larger angles: NaN beyond [`LIMIT_F32`].
+    bounded pairs bounded_pairs_f32;
     /// The main path on numbers of any kind, for |x| up to [`LIMIT_F32`]: the sine and cosine of `x`, rad.
     path path_f32;
     /// The first part of [`path_f32`]: `y0`, `y1` and the quadrant, with `x = y0 + y1 + quadrant · π/2`.
@@ -425,7 +484,8 @@ sincos! {
     /// The second part of [`path_f32`]: sine and cosine of `y0 + y1 + quadrant · π/2`, for |y0| up to slightly above π/4.
     /// `y1` is at most some units in the last place of `y0`, except where both are tiny.
     kernel kernel_f32;
-    parts fast_f32, slow_f32, far_f32, exact_f32, large_f32, repair_f32, block_f32, flat_f32
+    parts fast_f32, slow_f32, far_f32, exact_f32, large_f32, repair_f32, block_f32, flat_f32,
+        one_f32, several_f32
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use multibody::codegen::options::PlanOptions;
 use multibody::codegen::read::{self, Base, ImportOptions};
 use multibody::codegen::search;
-use multibody::runtime::integrate::{Gauss16, Rk4, Solver, Step, Stepper, Tolerances};
+use multibody::runtime::integrate::{Gauss16, Rk4, Solver, Step, StepError, Stepper, Tolerances};
 use multibody::runtime::system::Part;
 use multibody::runtime::{Interpreter, System};
 
@@ -18,6 +18,7 @@ pub mod odd_names {
 pub mod made {
     // There are several types in one module, and the module imports nothing.
     multibody::mbd_model! { path = "models/double_pendulum.toml", name = DoublePendulum, arithmetic = exact }
+    multibody::mbd_model! { path = "models/double_pendulum.toml", name = Bounded, arithmetic = exact, angles = bounded }
     multibody::mbd_model! { path = "models/double_pendulum.toml", name = Again, outputs = [velocities], efforts = false }
     multibody::mbd_model! { path = "models/ur5.urdf", name = pub(crate) Ur5, arithmetic = exact }
     multibody::mbd_model! { path = "models/solo12.urdf", name = Solo12, base = floating, arithmetic = exact }
@@ -174,6 +175,26 @@ fn arguments_take_effect() {
     assert!(v[0] > 0.0);
     assert_eq!(made::Wrapped::new().energy(&[0.0, 0.0], &[0.0, 0.0])[0], 0.0);
     assert_eq!(made::Bare::NQ, 2);
+}
+
+/// Code for bounded angles is the same up to the bound; beyond it a step is an error.
+#[test]
+fn bounded_angles() {
+    let (mut all, mut bounded) = (made::DoublePendulum::new(), made::Bounded::new());
+    let p = [0.3, -0.2];
+    for angle in [0.5, -40.0, 1e6] {
+        let ((mut qd, mut pd), (mut qd_bounded, mut pd_bounded)) = (([0.0; 2], [0.0; 2]), ([0.0; 2], [0.0; 2]));
+        all.rates(&[angle, -angle], &p, &mut qd, &mut pd);
+        bounded.rates(&[angle, -angle], &p, &mut qd_bounded, &mut pd_bounded);
+        assert_eq!((qd, pd), (qd_bounded, pd_bounded), "{angle}");
+    }
+    let state = ([1.0, 1.1e6], p);
+    let (mut q, mut p) = state;
+    assert!(Rk4::new(&all).step(&mut all, 0.0, 1e-3, &mut q, &mut p).is_ok());
+    let (mut q, mut p) = state;
+    let error = Rk4::new(&bounded).step(&mut bounded, 0.0, 1e-3, &mut q, &mut p);
+    assert!(matches!(error, Err(StepError::NotFinite { .. })), "{error:?}");
+    assert_eq!((q, p), state);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use multibody::codegen::options::{EliminationStrategy, PlanOptions, RowElimination, DEFAULT_SNAP};
+use multibody::codegen::options::{AngleRange, EliminationStrategy, PlanOptions, RowElimination, DEFAULT_SNAP};
 use multibody::codegen::output;
 use multibody::codegen::{camel_case, Arithmetic, LikeBranches, Options, Output, Precision, RolledCode};
 
@@ -22,6 +22,9 @@ pub struct CodeArgs {
     /// Arithmetic: the interpreter's bits, or operations that are rewritten for speed
     #[arg(long, value_parser = choice!(Arithmetic), default_value = Arithmetic::default().name())]
     pub arithmetic: Arithmetic,
+    /// Angles that Rust and C code are for; WebAssembly is for every angle
+    #[arg(long, value_parser = choice!(AngleRange), default_value = AngleRange::default().name())]
+    pub angles: AngleRange,
     /// Strategy of elimination; `mbd count` shows the candidates
     #[arg(long, alias = "forms", value_parser = choice!(EliminationStrategy), default_value = EliminationStrategy::default().name())]
     pub elimination: EliminationStrategy,
@@ -91,6 +94,7 @@ impl CodeArgs {
             },
             chunk: self.chunk as usize,
             arithmetic: self.arithmetic,
+            angles: self.angles,
             ..Options::default()
         }
     }

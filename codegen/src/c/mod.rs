@@ -122,7 +122,7 @@ fn files(input: &Input, name: &str) -> (String, String) {
     let definitions: Vec<String> = functions.iter().map(Function::definition).collect();
     if needs.sines {
         let several = definitions.iter().any(|text| text.contains(&format!("{}_sines_cosines(", prefix.lower)));
-        source += &sines::functions(prefix, options.precision, options.arithmetic, several);
+        source += &sines::functions(prefix, options, several);
     }
     source += &header::inputs_init(prefix, &fields, options.precision);
     for text in definitions {

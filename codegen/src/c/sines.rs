@@ -5,12 +5,13 @@ use mbd_runtime::trig::{QUARTER_PI, TWO_OVER_PI};
 use super::instructions::{Value, Writer};
 use super::names::{literal, number, Prefix};
 use crate::lower::{limit, reduced, within_quadrant};
-use crate::options::{Arithmetic, Precision};
+use crate::options::{AngleRange, Arithmetic, Options, Precision};
 
 /// The functions for one angle and, if it is called, for several, and what they need.
-pub fn functions(prefix: &Prefix, precision: Precision, arithmetic: Arithmetic, several: bool) -> String {
+pub fn functions(prefix: &Prefix, options: &Options, several: bool) -> String {
+    let precision = options.precision;
     let plain = reduced_body(prefix, precision, false);
-    let (fma, reduced) = match arithmetic {
+    let (fma, reduced) = match options.arithmetic {
         Arithmetic::Exact => (String::new(), plain),
         Arithmetic::Fast => {
             let fused = reduced_body(prefix, precision, true);
@@ -55,7 +56,11 @@ pub fn functions(prefix: &Prefix, precision: Precision, arithmetic: Arithmetic, 
         ("SCALE", ((1 << (exponent - 1)) - bits).to_string()),
         ("REST", (bits - stored - 1).to_string()),
     ];
-    let text = if several { [TEXT, SEVERAL].concat() } else { TEXT.to_string() };
+    let (far, domain) = match options.angles {
+        AngleRange::Any => (FAR, "within one unit in the last place for every finite x"),
+        AngleRange::Bounded => (NO_NUMBER, "within one unit in the last place; NaN where it is beyond that range"),
+    };
+    let text = [NEAR, far, &ONE.replace("@DOMAIN@", domain), if several { SEVERAL } else { "" }].concat();
     words.iter().chain(&numbers).fold(text, |text, (word, by)| text.replace(&format!("@{word}@"), by))
 }
 
@@ -121,8 +126,8 @@ fn high_word(precision: Precision) -> &'static str {
     }
 }
 
-/// The text, with words between `@` for what depends on the number type.
-const TEXT: &str = "
+/// The main path, with words between `@` for what depends on the number type.
+const NEAR: &str = "
 /* A number and its bits. */
 typedef union {
     @NUMBER@ number;
@@ -160,7 +165,10 @@ static inline void @PREFIX@_near(@NUMBER@ x, @NUMBER@ *restrict sine, @NUMBER@ *
 {
 @REDUCED@
 }
+";
 
+/// What is beyond the main path.
+const FAR: &str = "
 /* The upper half of a product. */
 static @UINT@ @PREFIX@_high(@UINT@ a, @UINT@ b)
 {
@@ -234,7 +242,23 @@ static @UINT@ @PREFIX@_high(@UINT@ a, @UINT@ b)
         *sine = -*sine;
     }
 }
+";
 
+/// The same in code for bounded angles.
+const NO_NUMBER: &str = "
+/* NaN for x beyond that range. */
+@UPPER@_RARE static void @PREFIX@_far(@NUMBER@ x, @NUMBER@ *restrict sine, @NUMBER@ *restrict cosine)
+{
+    @PREFIX@_view view;
+    (void)x;
+    view.bits = @QUIET_NAN@;
+    *sine = view.number;
+    *cosine = view.number;
+}
+";
+
+/// One angle.
+const ONE: &str = "
 /* Whether x is beyond that range: large, infinite or NaN. The comparison is on the bits, so that NaN counts as large. */
 static inline int @PREFIX@_beyond(@NUMBER@ x)
 {
@@ -243,7 +267,7 @@ static inline int @PREFIX@_beyond(@NUMBER@ x)
     return (view.bits << 1) > (@LIMIT_BITS@ << 1);
 }
 
-/* Sine and cosine of x, rad, within one unit in the last place for every finite x. */
+/* Sine and cosine of x, rad, @DOMAIN@. */
 static inline void @PREFIX@_sine_cosine(@NUMBER@ x, @NUMBER@ *restrict sine, @NUMBER@ *restrict cosine)
 {
     if (@PREFIX@_beyond(x) != 0) {

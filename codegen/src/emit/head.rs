@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use super::numbers::{literal, minus, signed};
 use super::signature::{Port, Signature};
-use crate::options::{Arithmetic, Options};
+use crate::options::{AngleRange, Arithmetic, Options};
 use crate::output::{locate, InputArray};
 use crate::symbolic::{FlooredReciprocal, Fma, Op, Operand, ProgramResult};
 
@@ -104,14 +104,21 @@ impl<'a> Head<'a> {
 
     /// `let` of a sine and a cosine of one angle.
     pub fn sine_and_cosine(&self, [sine, cosine]: [&str; 2], angle: &str) -> String {
-        let (rt, number, arithmetic) = (&self.options.runtime, self.options.precision.name(), self.arithmetic());
-        format!("let ({sine}, {cosine}) = {rt}::trig::pair_{number}::<{arithmetic}>({angle});")
+        format!("let ({sine}, {cosine}) = {}<{}>({angle});", self.trigonometry("pair"), self.arithmetic())
     }
 
     /// Sines and cosines of `n` angles in every lane.
     pub fn sines_and_cosines(&self, angles: &str, n: usize) -> String {
-        let (rt, number, arithmetic) = (&self.options.runtime, self.options.precision.name(), self.arithmetic());
-        format!("{rt}::trig::pairs_{number}::<{arithmetic}, LANES, {n}>(&{angles})")
+        format!("{}<{}, LANES, {n}>(&{angles})", self.trigonometry("pairs"), self.arithmetic())
+    }
+
+    /// Path of the function for sines and cosines of one angle or several, for the angles that the code is for.
+    fn trigonometry(&self, name: &str) -> String {
+        let bounded = match self.options.angles {
+            AngleRange::Any => "",
+            AngleRange::Bounded => "bounded_",
+        };
+        format!("{}::trig::{bounded}{name}_{}::", self.options.runtime, self.options.precision.name())
     }
 
     /// Right-hand side of an operation; inputs, sines and cosines are written by the caller.

@@ -3,7 +3,9 @@
 use mbd_runtime::tree::Source;
 
 use super::Input;
+use crate::lower::limit;
 use crate::model::{ConstraintKind, Gravity, Mount, Value};
+use crate::options::AngleRange;
 use crate::plan::Plan;
 
 /// Source, options, state, constraints, counts: the lines of the comment.
@@ -21,6 +23,10 @@ pub fn lines(Input { plan, options, programs }: &Input) -> Vec<String> {
             options.plan.snap
         ),
     ];
+    if options.angles == AngleRange::Bounded {
+        let limit = limit(options.precision);
+        lines.push(format!("Angles: at most {limit} rad; beyond, results are not numbers."));
+    }
     state(&mut lines, plan);
     constraints(&mut lines, plan);
     lines.push(String::new());

@@ -304,6 +304,40 @@ fn paths_and_lanes_agree() {
     }
 }
 
+/// Code for bounded angles has the bits of the other on the main path, and NaN beyond it.
+#[test]
+fn bounded_angles_are_those_of_the_main_path() {
+    macro_rules! check {
+        ($float:ident, $limit:ident, $pairs:ident, $bounded:ident, $bounded_pair:ident) => {{
+            let mut random = Random(9);
+            let next = $float::from_bits($limit.to_bits() + 1);
+            let ends =
+                [0.0, -0.0, $limit, -$limit, next, -next, 3.0 * $limit, $float::MAX, $float::INFINITY, $float::NAN];
+            let inner = core::array::from_fn::<$float, 31, _>(|_| random.within(1.2 * f64::from($limit)) as $float);
+            let mut x = [[0.0; 8]; 7];
+            x.as_flattened_mut().iter_mut().zip(ends.into_iter().chain(inner)).for_each(|(x, y)| *x = y);
+            fn compare<A: Arithmetic>(x: &[[$float; 8]; 7]) {
+                let (all, bounded) = ($pairs::<A, 8, 7>(x), $bounded::<A, 8, 7>(x));
+                for (k, x) in x.as_flattened().iter().enumerate() {
+                    let of = |pair: &([[$float; 8]; 7], [[$float; 8]; 7])| {
+                        (pair.0.as_flattened()[k], pair.1.as_flattened()[k])
+                    };
+                    for found in [of(&bounded), $bounded_pair::<A>(*x)] {
+                        match x.abs() <= $limit {
+                            true => assert_eq!(found, of(&all), "{x:e}"),
+                            false => assert!(found.0.is_nan() && found.1.is_nan(), "{x:e}: {found:?}"),
+                        }
+                    }
+                }
+            }
+            compare::<Plain>(&x);
+            compare::<Fused>(&x);
+        }};
+    }
+    check!(f64, LIMIT_F64, pairs_f64, bounded_pairs_f64, bounded_pair_f64);
+    check!(f32, LIMIT_F32, pairs_f32, bounded_pairs_f32, bounded_pair_f32);
+}
+
 /// Every finite `f32`, against the C library in double precision (whose error is 2^-29 of an `f32` ulp).
 #[test]
 #[ignore = "minutes: 2^31 points (the negative ones follow from symmetry)"]

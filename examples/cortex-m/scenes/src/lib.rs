@@ -25,6 +25,7 @@ mbd_macros::mbd_model! {
     name = Ur5F32,
     scalar = f32,
     elimination = fewest,
+    angles = bounded,
     outputs = [rates, momenta, energy, derivatives]
 }
 mbd_macros::mbd_model! {
@@ -32,6 +33,7 @@ mbd_macros::mbd_model! {
     name = Ur5F64,
     scalar = f64,
     elimination = fewest,
+    angles = bounded,
     outputs = [rates, momenta, energy]
 }
 mbd_macros::mbd_model! {

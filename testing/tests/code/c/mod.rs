@@ -9,6 +9,7 @@ use std::fmt::Write;
 
 use compiler::{build, compilers, run};
 use mbd_codegen::generate::InputArray;
+use mbd_codegen::options::AngleRange;
 use mbd_codegen::read::{self, ImportOptions};
 use mbd_codegen::{c, Arithmetic, Options, Output, Precision};
 use mbd_testing::conformance::{angles, chain, closed, far, sine_and_cosine, tree, Case, Run};
@@ -129,7 +130,7 @@ joint = [
 "#;
 
 /// Sines and cosines, one after the other, of two angles in each call, by C.
-fn sines(test: &str, precision: Precision, angles: &[f64]) -> Vec<(&'static str, Vec<f64>)> {
+fn sines(test: &str, precision: Precision, range: AngleRange, angles: &[f64]) -> Vec<(&'static str, Vec<f64>)> {
     let folder = folder(test);
     let model = read::model("two_angles.toml", TWO_ANGLES, &ImportOptions::default()).expect("a model").model;
     let options = Options {
@@ -137,6 +138,7 @@ fn sines(test: &str, precision: Precision, angles: &[f64]) -> Vec<(&'static str,
         outputs: vec![Output::Frames],
         frames: ["a", "b"].map(str::to_string).to_vec(),
         precision,
+        angles: range,
         arithmetic: Arithmetic::Exact,
         ..Options::default()
     };
@@ -175,14 +177,25 @@ int main(void)
 
 #[test]
 fn sines_have_the_bits_of_the_runtime() {
-    for (test, precision) in [("c_sines_f64", Precision::F64), ("c_sines_f32", Precision::F32)] {
+    for (test, precision, range) in [
+        ("c_sines_f64", Precision::F64, AngleRange::Any),
+        ("c_sines_f32", Precision::F32, AngleRange::Any),
+        ("c_bounded_sines_f64", Precision::F64, AngleRange::Bounded),
+        ("c_bounded_sines_f32", Precision::F32, AngleRange::Bounded),
+    ] {
+        let limit = match (range, precision) {
+            (AngleRange::Any, _) => f64::INFINITY,
+            (AngleRange::Bounded, Precision::F64) => 1e6,
+            (AngleRange::Bounded, Precision::F32) => 1600.0,
+        };
         let mut angles = angles(precision);
         // Calls take two.
         angles.truncate(angles.len() / 2 * 2);
-        for (compiler, found) in sines(test, precision, &angles) {
+        for (compiler, found) in sines(test, precision, range, &angles) {
             assert_eq!(found.len(), 2 * angles.len());
             for (angle, pair) in angles.iter().zip(found.as_chunks::<2>().0) {
-                let expected = sine_and_cosine(precision, *angle);
+                let within = angle.abs() <= limit;
+                let expected = if within { sine_and_cosine(precision, *angle) } else { [f64::NAN; 2] };
                 let mut both = pair.iter().zip(&expected);
                 let same = both.all(|(a, b)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()));
                 assert!(same, "{compiler}: {angle:e}: {pair:?}, by the runtime {expected:?}");
