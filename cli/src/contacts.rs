@@ -255,14 +255,15 @@ pub fn simulate(plan: &Plan, (q, v): (Vec<f64>, Vec<f64>), settings: &Settings, 
     }
     progress.clear();
     let end = motion.time();
-    if observer.cut && observer.record.t.last() != Some(&end) {
-        // Events and forces are known to here; of the rows in between, there are none.
+    let interrupted = observer.cut || end < settings.time;
+    if interrupted && observer.record.t.last() != Some(&end) {
+        // Events and forces are known to here; of the rows in between, some may be missing.
         let (mut q, mut p) = (observer.q.clone(), observer.p.clone());
         motion.state(&system, &mut q, &mut p);
         (observer.q, observer.p) = (q, p);
         observer.row(&mut system, end);
     }
-    observer.record.interrupted = (observer.cut || end < settings.time).then_some(end);
+    observer.record.interrupted = interrupted.then_some(end);
     let statistics: Statistics = motion.integration_statistics();
     let (modes, count) = (system.modes().iter().copied().enumerate(), system.modes().len());
     Ok(Touched {

@@ -399,7 +399,13 @@ fn go(
     let mut until = instants.next().unwrap_or(time);
     while driver.time() < time {
         if interrupt::asked() {
-            observer.record.interrupted = Some(driver.time());
+            let end = driver.time();
+            observer.record.interrupted = Some(end);
+            if observer.record.t.last().is_some_and(|last| *last < end) {
+                // A row at the end, as where a motion is not interrupted.
+                driver.state(system, &mut q, &mut p);
+                observer.row(end, &q, &p);
+            }
             break;
         }
         driver.advance(system, until).inspect_err(|_| progress.clear())?;

@@ -359,8 +359,8 @@ Steps are chosen by their error (--tolerance) with Verner's method of order 9, u
 they are fixed, by the classical Runge-Kutta method of order 4 unless --method says otherwise. Rows of the table lie at
 equal times, between the steps by dense output.
 
-The start, unless --q and --v say otherwise: angles 0.3 and -0.3 rad in turn, displacements 0.05 m, planar, spherical and
-floating joints neutral; every velocity 0.1 (rad/s or m/s), or zero under control. A model with `start`s, loops, couplings or
+The start, unless --q and --v say otherwise: joints of one freedom at 0.3 and -0.3 rad in turn or 0.05 m, all others
+neutral; every velocity 0.1 (rad/s or m/s), or zero under control. A model with `start`s, loops, couplings or
 contacts starts from its `start`s, neutral where it states none, at rest or with its `start_velocity`s. A position that is not
 stated and outside the range or the limits of its joint is moved to the middle of them, but for joints of loops and couplings.
 Loops are closed from there (from --q, if given) without moving `held` joints.

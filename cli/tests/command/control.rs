@@ -341,5 +341,8 @@ fn an_interrupted_run_writes_what_it_has() {
     assert_eq!(status.code(), Some(130));
     let rows = Rows::read(&folder, "pendulum.csv");
     assert!(rows.rows.len() > 10, "{}", rows.rows.len());
+    // The last row is the end, which lies between those at equal times.
+    let tenths = 10.0 * rows.last("t");
+    assert!((tenths - tenths.round()).abs() > 1e-9, "{tenths}");
     assert!(read(&folder, "pendulum.svg").contains("</svg>"));
 }

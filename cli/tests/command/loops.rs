@@ -149,3 +149,39 @@ fn evaluates() {
     let kinetic = other["kinetic"].as_f64().expect("a number");
     assert!((kinetic - nearest).abs() < 1e-12 && kinetic < given - 1e-6, "{kinetic} {nearest} {given}");
 }
+
+/// The table of the book is what its commands print, up to a factor of three in what rounding decides.
+#[test]
+fn the_table_of_mechanisms_is_what_is_printed() {
+    let folder = folder("loops_table");
+    let page = include_str!("../../../book/src/mechanisms.md");
+    let after = |text: &str, what: &str| -> f64 {
+        let rest = text.split(what).nth(1).unwrap_or_else(|| panic!("{what}: {text}"));
+        let end = rest.find(|c: char| !c.is_ascii_digit() && !"e-.".contains(c)).unwrap_or(rest.len());
+        rest[..end].parse().unwrap_or_else(|e| panic!("{what}: {e}: {text}"))
+    };
+    let mut rows = 0;
+    for row in page.lines().filter(|line| line.starts_with("| `")) {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        let [_, name, _, count, independent, mobility, energy, drift, _] = cells[..] else { panic!("{row}") };
+        let file = format!("models/mechanisms/{}.toml", name.trim_matches('`'));
+        let command = page.lines().find(|line| line.trim_start().starts_with(&format!("mbd simulate {file} ")));
+        let words: Vec<&str> = command.unwrap_or_else(|| panic!("no command for {file}")).split_whitespace().collect();
+        // The start and the length of the motion; pictures and tables are not written.
+        let all = words.iter().position(|word| *word == "--picture").unwrap_or(words.len());
+        let arguments: Vec<String> =
+            words[1..all].iter().map(|word| word.replace("models/", &format!("{ROOT}/models/"))).collect();
+        let output = good(run_in(&folder, &arguments.iter().map(String::as_str).collect::<Vec<_>>()));
+        let text = out(&output);
+        assert!(
+            text.contains(&format!("{count} rows, {independent} independent, mobility {mobility}")),
+            "{row}\n{text}"
+        );
+        for (what, told) in [("energy error: at most ", energy), ("loops open by up to ", drift)] {
+            let (found, told) = (after(text, what), told.parse::<f64>().expect("a number"));
+            assert!(found < 3.0 * told && told < 3.0 * found, "{name}: {what}{found:e}, in the book {told:e}");
+        }
+        rows += 1;
+    }
+    assert_eq!(rows, 10);
+}
