@@ -170,8 +170,7 @@ macro_rules! sincos {
                 // little memory, and would call a function to write zeros.
                 let (mut sin, mut cos) = (*x, *x);
                 for (s, c) in sin.as_flattened_mut().iter_mut().zip(cos.as_flattened_mut()) {
-                    // The compiler does not copy a loop that has this in it. Without it, one that calls for the reduction of large
-                    // angles is not copied either.
+                    // The compiler does not copy a loop that has this in it, nor one that calls for the reduction of large angles.
                     #[cfg(target_arch = "arm")]
                     if BOUNDED {
                         core::hint::black_box(());

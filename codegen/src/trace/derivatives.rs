@@ -19,7 +19,7 @@ impl<'g> Run<'_, 'g> {
         let sweeps = Sweeps { tree, trace };
         let w = &mut Workspace::new(tree);
         let constrained = !self.plan.constraints.is_empty();
-        let directional = Directional { graph: trace, plan: self.plan, given, tolerance: tree.tolerance };
+        let directional = Directional { graph: trace, plan: self.plan, given, tree };
         match (output, results) {
             (Output::Derivatives, [v, pd, dv_dq, dv_dp, dpd_dq, dpd_dp]) => {
                 let mut d = Derivatives::new(tree);

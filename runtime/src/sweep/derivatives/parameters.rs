@@ -34,7 +34,7 @@ impl<S: Scalar, T: Trace> Sweeps<'_, S, T> {
 /// Derivatives along one change of the constants of a mechanism, gravity included.
 ///
 /// With `p` and `ṗ` at given velocities differentiated by dual numbers (sparse: few constants change), the rest follows
-/// from the blocks of [`Derivatives`]: `dv = −(∂v/∂p) δp`, `dṗ = δṗ − (∂ṗ/∂p) δp`.
+/// from the derivatives with respect to momenta: `dv = −(∂v/∂p) δp`, `dṗ = δṗ − (∂ṗ/∂p) δp`.
 #[derive(Clone, Debug)]
 pub struct ParameterDerivatives<S> {
     /// `dv`, one number for each velocity.
@@ -46,6 +46,8 @@ pub struct ParameterDerivatives<S> {
     wrenches: Vec<[Dual<S>; 6]>,
     p: Vec<Dual<S>>,
     pd: Vec<Dual<S>>,
+    /// Of the solution where the momenta change: momenta, their rates, velocities, coordinate rates.
+    solution: [Vec<Dual<S>>; 4],
 }
 
 impl<S: Scalar> ParameterDerivatives<S> {
@@ -61,6 +63,7 @@ impl<S: Scalar> ParameterDerivatives<S> {
             wrenches: vec![[o; 6]; d.wrenches],
             p: list(d.nv),
             pd: list(d.nv),
+            solution: [d.nv, d.nv, d.nv, d.nq].map(list),
         }
     }
 
@@ -74,7 +77,47 @@ impl<S: Scalar> ParameterDerivatives<S> {
         u: &Inputs<S>,
         at: &Derivatives<S>,
     ) {
-        let given = [q, &at.v, u.tau, u.drive_q, u.drive_v, u.drive_a];
+        self.vary(sweeps, gravity, q, &at.v, u);
+        let nv = self.dv.len();
+        sweeps.trace.at(None, Quantity::Derivative);
+        for a in 0..nv {
+            let (mut dv, mut dpd) = (S::zero(), self.pd[a].du);
+            for b in 0..nv {
+                dv = dv - at.dv_dp[a * nv + b] * self.p[b].du;
+                dpd = dpd - at.dpd_dp[a * nv + b] * self.p[b].du;
+            }
+            (self.dv[a], self.dpd[a]) = (dv, dpd);
+        }
+    }
+
+    /// The same for a mechanism with constraints, along a change that leaves their rows and `b` as they are: of inertias, springs,
+    /// dampers and gravity. In `M v + Φᵀσ = p`, `Φ v = b` it is then like a change of the momenta by `−δp`, and the sweeps
+    /// of the rates solve for that: `fixed` is over the tree that does not vary. The state is `(q, p)`, `v` its velocities.
+    pub fn compute_with_rows<T: Trace>(
+        &mut self,
+        (sweeps, gravity): (&Sweeps<Dual<S>, T>, [Dual<S>; 3]),
+        fixed: &Sweeps<Dual<S>, T>,
+        (q, p, v): (&[S], &[S], &[S]),
+        u: &Inputs<S>,
+    ) {
+        self.vary(sweeps, gravity, q, v, u);
+        let [momenta, rates, velocities, coordinates] = &mut self.solution;
+        for (to, (p, varied)) in momenta.iter_mut().zip(p.iter().zip(&self.p)) {
+            *to = Dual::new(*p, -varied.du);
+        }
+        let [q, _, tau, drive_q, drive_v, drive_a] = &self.lists;
+        let gravity = u.gravity.map(|x| Dual::new(x, S::zero()));
+        let u = Inputs { tau, drive_q, drive_v, drive_a, wrenches: &self.wrenches, gravity };
+        fixed.rates(q, momenta, &u, &mut self.work, velocities, coordinates, rates);
+        fixed.trace.at(None, Quantity::Derivative);
+        for (a, (velocity, rate)) in velocities.iter().zip(rates.iter()).enumerate() {
+            (self.dv[a], self.dpd[a]) = (velocity.du, self.pd[a].du + rate.du);
+        }
+    }
+
+    /// Momenta and their rates at given velocities, with derivatives.
+    fn vary<T: Trace>(&mut self, sweeps: &Sweeps<Dual<S>, T>, gravity: [Dual<S>; 3], q: &[S], v: &[S], u: &Inputs<S>) {
+        let given = [q, v, u.tau, u.drive_q, u.drive_v, u.drive_a];
         for (list, given) in self.lists.iter_mut().zip(given) {
             for (to, x) in list.iter_mut().zip(given) {
                 *to = Dual::new(*x, S::zero());
@@ -86,15 +129,5 @@ impl<S: Scalar> ParameterDerivatives<S> {
         let [q, v, tau, drive_q, drive_v, drive_a] = &self.lists;
         let u = Inputs { tau, drive_q, drive_v, drive_a, wrenches: &self.wrenches, gravity };
         sweeps.momenta_and_rates(q, v, &u, &mut self.work, &mut self.p, &mut self.pd);
-        let nv = self.dv.len();
-        sweeps.trace.at(None, Quantity::Derivative);
-        for a in 0..nv {
-            let (mut dv, mut dpd) = (S::zero(), self.pd[a].du);
-            for b in 0..nv {
-                dv = dv - at.dv_dp[a * nv + b] * self.p[b].du;
-                dpd = dpd - at.dpd_dp[a * nv + b] * self.p[b].du;
-            }
-            (self.dv[a], self.dpd[a]) = (dv, dpd);
-        }
     }
 }
