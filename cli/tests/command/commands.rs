@@ -23,6 +23,38 @@ fn help_teaches() {
     assert_eq!(run(&["count", "models/ur5.urdf", "--gravity", "1,2"]).status.code(), Some(2));
 }
 
+/// The options of a command that stand under a heading of its help.
+fn options_under(help: &str, heading: &str) -> Vec<String> {
+    let (_, rest) = help.split_once(&format!("\n{heading}:\n")).expect("the heading");
+    // The next heading begins a line.
+    let lines = rest.lines().take_while(|line| line.is_empty() || line.starts_with(' '));
+    let options = lines.filter_map(|line| line.strip_prefix("      --"));
+    options.map(|option| option.split(' ').next().unwrap_or_default().to_string()).collect()
+}
+
+#[test]
+fn only_options_of_the_control_stand_under_it() {
+    let control = [
+        "efforts",
+        "set-points",
+        "wrenches",
+        "interpolation",
+        "kp",
+        "kd",
+        "gravity-compensation",
+        "actuated",
+        "unlimited",
+    ];
+    for (command, others) in [("simulate", &["time", "project", "csv", "names"][..]), ("modes", &["time", "record"])] {
+        let output = good(run(&[command, "--help"]));
+        assert_eq!(options_under(out(&output), "Control"), control, "{command}");
+        let options = options_under(out(&output), "Options");
+        for name in others {
+            assert!(options.iter().any(|option| option == name), "{command}: {name}");
+        }
+    }
+}
+
 #[test]
 fn check_tells_what_is_sound() {
     let output = good(run(&["check", "models/satellite.toml", "models/panda.urdf"]));
