@@ -228,6 +228,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn help_has_one_sentence_for_every_output() {
+        let text = help();
+        let sentences: Vec<&str> = text.lines().filter_map(|line| line.strip_prefix("      ")).collect();
+        let outputs = Output::ALL.iter().filter(|output| output.spec().availability != WithContacts);
+        assert_eq!(sentences.len(), outputs.count());
+        for sentence in sentences {
+            assert!(sentence.ends_with('.') && !sentence.contains(". "), "{sentence}");
+        }
+    }
+
+    #[test]
     fn arguments_of_a_function_have_different_names() {
         for output in Output::ALL {
             let spec = output.spec();

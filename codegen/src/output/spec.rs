@@ -195,7 +195,7 @@ impl Spec {
         Spec { search, ..self }
     }
 
-    /// Lines of the documentation; the first stands for itself.
+    /// Lines of the documentation; its first sentence stands for itself.
     pub fn doc(&self) -> impl Iterator<Item = &'static str> {
         self.doc.trim_end().lines().map(str::trim)
     }

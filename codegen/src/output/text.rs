@@ -15,6 +15,15 @@ impl Spec {
         let [inputs, results] = [self.inputs, self.results].map(|arrays| names(arrays.iter().map(|array| array.name)));
         format!("({inputs}) -> {results}")
     }
+
+    /// The first sentence of the documentation, which may go on in its second line.
+    fn summary(&self) -> String {
+        let doc = self.doc().collect::<Vec<_>>().join(" ");
+        match doc.split_once(". ") {
+            Some((first, _)) => format!("{first}."),
+            None => doc,
+        }
+    }
 }
 
 /// Help of an option that lists outputs.
@@ -29,9 +38,7 @@ pub fn help() -> String {
         };
         for spec in Output::ALL.iter().map(|output| output.spec()).filter(with) {
             let _ = write!(out, "\n  {} {}", spec.name, spec.arrow());
-            spec.doc().take(1).for_each(|line| {
-                let _ = write!(out, "\n      {line}");
-            });
+            let _ = write!(out, "\n      {}", spec.summary());
         }
     };
     rows(&mut out, false);
