@@ -45,13 +45,13 @@ pub struct CodeArgs {
     #[arg(long, value_name = "TYPE", value_parser = type_name)]
     pub name: Option<String>,
     /// Angles this close to right angles are taken as exact, rad; 0 keeps every number. Changes are reported
-    #[arg(long, value_name = "RAD", default_value_t = DEFAULT_SNAP, value_parser = snap)]
+    #[arg(long, value_name = "RAD", default_value_t = DEFAULT_SNAP, allow_negative_numbers = true, value_parser = snap)]
     pub snap: f64,
     /// Frames and bodies of outputs that have a result for each frame, separated by commas [default: all]
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     pub frames: Vec<String>,
     /// Largest number of statements in one block of the generated code
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1000, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..))]
     pub chunk: u32,
 }
 

@@ -11,7 +11,7 @@ use clap::{ArgGroup, Args, Parser, Subcommand, ValueEnum};
 use multibody::codegen::options::DEFAULT_SNAP;
 use multibody::codegen::read::{Base, Floor, ImportOptions};
 use multibody::runtime::constrained::Stabilisation;
-use values::{choice, finite, methods, one_of, positive, snap, vector};
+use values::{choice, finite, methods, not_negative, one_of, positive, snap, vector, whole};
 
 pub use control::{ControlArgs, Gain, Interpolation};
 pub use generate::{CodeArgs, GenerateArgs, Language, DEFAULT_RUNTIME};
@@ -113,7 +113,7 @@ pub struct TouchArgs {
     #[arg(long, group = "touched")]
     pub self_contact: bool,
     /// Coefficient of friction on that floor and between bodies
-    #[arg(long, value_name = "MU", default_value_t = 0.5, value_parser = finite, requires = "touched")]
+    #[arg(long, value_name = "MU", default_value_t = 0.5, allow_negative_numbers = true, value_parser = not_negative, requires = "touched")]
     pub friction: f64,
 }
 
@@ -263,7 +263,7 @@ pub struct EvalArgs {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", hide_possible_values = true)]
     pub outputs: Vec<Quantity>,
     /// Angles this close to right angles are taken as exact, rad
-    #[arg(long, value_name = "RAD", default_value_t = 0.0, value_parser = snap)]
+    #[arg(long, value_name = "RAD", default_value_t = 0.0, allow_negative_numbers = true, value_parser = snap)]
     pub snap: f64,
     /// Evaluate any number of states with the interpreter: the same numbers as the machine code that is otherwise made of
     /// the model for a thousand states or more
@@ -333,13 +333,13 @@ pub struct CertifyArgs {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "LIST", hide_possible_values = true)]
     pub outputs: Vec<Quantity>,
     /// Number of parts into which the box is divided
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub split: u32,
     /// Number of random states of the box that are evaluated in double-double numbers and compared with the bounds
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     pub samples: u32,
     /// Angles this close to right angles are taken as exact, rad
-    #[arg(long, value_name = "RAD", default_value_t = 0.0, value_parser = snap)]
+    #[arg(long, value_name = "RAD", default_value_t = 0.0, allow_negative_numbers = true, value_parser = snap)]
     pub snap: f64,
     /// Print JSON
     #[arg(long)]
@@ -394,10 +394,10 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
     /// Rows of the table after that of the start, at equal times [default: 1000]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = whole)]
     pub rows: Option<u64>,
     /// Time from one row of the table to the next, s
-    #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "rows")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive, conflicts_with = "rows")]
     pub every: Option<f64>,
     /// Columns of the table: `q`, `v`, `p`, `energy`, `tau` (joint forces of the control), `frames` (positions of all bodies and
     /// frames, m), `multipliers`, `forces` (of contacts), or names of single columns; separated by commas
@@ -417,7 +417,7 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "picture")]
     pub trace: Vec<String>,
     /// Number of instants that are drawn
-    #[arg(long, value_name = "N", default_value_t = 9, value_parser = clap::value_parser!(u16).range(1..=500), requires = "picture")]
+    #[arg(long, value_name = "N", default_value_t = 9, allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=500), requires = "picture")]
     pub strobes: u16,
     /// Let the picture move: the motion in a loop, slowed down or sped up as the caption says, without a script. Readers who
     /// prefer reduced motion see the still picture
@@ -447,13 +447,13 @@ pub struct MotionArgs {
     #[command(flatten)]
     pub touch: TouchArgs,
     /// Length of the simulation, s
-    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = positive)]
+    #[arg(long, value_name = "S", default_value_t = 10.0, allow_negative_numbers = true, value_parser = positive)]
     pub time: f64,
     /// Method [default: verner9, with --step rk4]
     #[arg(long, value_name = "NAME", value_parser = methods())]
     pub method: Option<String>,
     /// Allowed error of a step, rad or m; for momenta relative to their size [default: 1e-9]
-    #[arg(long, value_name = "X", value_parser = positive, conflicts_with = "step")]
+    #[arg(long, value_name = "X", allow_negative_numbers = true, value_parser = positive, conflicts_with = "step")]
     pub tolerance: Option<f64>,
     /// Choose steps by the errors of the coordinates alone, not of the momenta
     #[arg(long, conflicts_with = "step")]
@@ -463,7 +463,7 @@ pub struct MotionArgs {
     #[arg(long)]
     pub interpreted: bool,
     /// Fixed step, s; shortened if the time is not a multiple of it
-    #[arg(long, value_name = "S", value_parser = positive)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub step: Option<f64>,
     /// Initial coordinates, separated by commas
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true, value_parser = finite)]
@@ -479,13 +479,13 @@ pub struct MotionArgs {
     #[arg(long)]
     pub no_damping: bool,
     /// Angles this close to right angles are taken as exact, rad
-    #[arg(long, value_name = "RAD", default_value_t = DEFAULT_SNAP, value_parser = snap)]
+    #[arg(long, value_name = "RAD", default_value_t = DEFAULT_SNAP, allow_negative_numbers = true, value_parser = snap)]
     pub snap: f64,
     /// How contacts are followed
     #[arg(long, value_enum, value_name = "HOW", default_value = "events")]
     pub contacts: ContactRegime,
     /// Time step of `--contacts stepping` and `auto`, s [default: 0.001]
-    #[arg(long, value_name = "S", value_parser = positive)]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     pub contact_step: Option<f64>,
     /// How contacts act that collide at the same instant, in motions by events
     #[arg(long, value_enum, value_name = "HOW", default_value = "together")]

@@ -37,6 +37,24 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Parses a number that is not negative.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    let x = finite(text)?;
+    if x >= 0.0 {
+        Ok(x)
+    } else {
+        Err("the number must not be negative".to_string())
+    }
+}
+
+/// Parses a whole number from 1 on.
+pub fn whole(text: &str) -> Result<u64, String> {
+    match text.trim().parse::<u64>() {
+        Ok(n) if n > 0 => Ok(n),
+        _ => Err("the number must be whole and positive".to_string()),
+    }
+}
+
 /// Parses the name of a method.
 pub fn methods() -> PossibleValuesParser {
     PossibleValuesParser::new(catalogue::entries().map(|e| PossibleValue::new(e.name).help(e.title)))

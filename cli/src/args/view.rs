@@ -33,12 +33,12 @@ pub struct ViewArgs {
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Port of 127.0.0.1 at which the empty page is served; 0 is a free one
-    #[arg(long, value_name = "PORT", default_value_t = 0, conflicts_with_all = ["model", "output"])]
+    #[arg(long, value_name = "PORT", default_value_t = 0, allow_negative_numbers = true, conflicts_with_all = ["model", "output"])]
     pub port: u16,
     /// Write the motion as glTF 2.0 for other viewers instead: `.gltf`, or `.glb` in binary form
     #[arg(long, value_name = "FILE", requires = "model", conflicts_with = "output")]
     pub gltf: Option<PathBuf>,
     /// Length of that motion, s
-    #[arg(long, value_name = "S", default_value_t = 10.0, value_parser = positive, requires = "gltf")]
+    #[arg(long, value_name = "S", default_value_t = 10.0, allow_negative_numbers = true, value_parser = positive, requires = "gltf")]
     pub time: f64,
 }

@@ -448,6 +448,36 @@ fn failed_simulations_write_nothing() {
     assert!(files(&folder).is_empty(), "{:?}", files(&folder));
 }
 
+/// Negative values of options that take a number are answered by what the numbers must be.
+#[test]
+fn negative_numbers_are_refused_as_such() {
+    let positive = "the number must be positive";
+    let angle = "the angle must lie between 0 and 0.1 rad";
+    for (arguments, answer) in [
+        (&["simulate", "m.toml", "--time", "-1"][..], positive),
+        (&["simulate", "m.toml", "--step", "-0.1"], positive),
+        (&["simulate", "m.toml", "--tolerance", "-1"], positive),
+        (&["simulate", "m.toml", "--contact-step", "-1"], positive),
+        (&["simulate", "m.toml", "--every", "-1"], positive),
+        (&["simulate", "m.toml", "--rows", "-1"], "the number must be whole and positive"),
+        (&["simulate", "m.toml", "--strobes", "-1", "--picture", "m.svg"], "-1 is not in 1..=500"),
+        (&["simulate", "m.urdf", "--friction", "-1", "--floor", "0"], "the number must not be negative"),
+        (&["simulate", "m.toml", "--snap", "-1"], angle),
+        (&["generate", "m.toml", "--snap", "-1"], angle),
+        (&["generate", "m.toml", "--chunk", "-1"], "-1 is not in 1..="),
+        (&["eval", "m.toml", "-i", "s.json", "--snap", "-1"], angle),
+        (&["certify", "m.toml", "--box", "s.json", "--snap", "-1"], angle),
+        (&["certify", "m.toml", "--box", "s.json", "--split", "-1"], "-1 is not in 1..=1000000"),
+        (&["certify", "m.toml", "--box", "s.json", "--samples", "-1"], "-1 is not in 0..="),
+        (&["view", "m.toml", "--gltf", "m.glb", "--time", "-1"], positive),
+        (&["view", "--port", "-1"], "-1 is not in 0..=65535"),
+    ] {
+        let output = run(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(err(&output).contains(answer), "{arguments:?}: {}", err(&output));
+    }
+}
+
 #[test]
 fn explains() {
     for (stage, texts) in [
