@@ -39,9 +39,7 @@ struct Entry {
     scalar: Option<String>,
     arithmetic: Option<String>,
     angles: Option<String>,
-    #[serde(alias = "forms")]
     elimination: Option<String>,
-    #[serde(alias = "loops")]
     rolled: Option<String>,
     branches: Option<String>,
     rows: Option<String>,

@@ -26,10 +26,10 @@ pub struct CodeArgs {
     #[arg(long, value_parser = choice!(AngleRange), default_value = AngleRange::default().name())]
     pub angles: AngleRange,
     /// Strategy of elimination; `mbd count` shows the candidates
-    #[arg(long, alias = "forms", value_parser = choice!(EliminationStrategy), default_value = EliminationStrategy::default().name())]
+    #[arg(long, value_parser = choice!(EliminationStrategy), default_value = EliminationStrategy::default().name())]
     pub elimination: EliminationStrategy,
     /// Where code is rolled: a loop over like links in place of straight-line code
-    #[arg(long, alias = "loops", value_parser = choice!(RolledCode), default_value = RolledCode::default().name())]
+    #[arg(long, value_parser = choice!(RolledCode), default_value = RolledCode::default().name())]
     pub rolled: RolledCode,
     /// Where like branches (legs, arms) are computed at the same time for one state
     #[arg(long, value_parser = choice!(LikeBranches), default_value = LikeBranches::default().name())]
