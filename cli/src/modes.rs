@@ -58,14 +58,20 @@ pub fn run(args: &ModesArgs, out: &mut dyn Write) -> Outcome {
     let mut visits = touched.visits;
     visits.sort_by(|a, b| b.1.total_cmp(&a.1));
     writeln!(out, "Sets of modes that it visits: {}, with the time in each:", visits.len())?;
+    let width = width(visits.iter().map(|(set, _)| words(set)));
     for (set, time) in &visits {
-        writeln!(out, "{:<40}{time:>12.6} s", words(set))?;
+        writeln!(out, "{:<width$}{time:>12.6} s", words(set))?;
     }
     writeln!(out)?;
     let sets = visits.into_iter().map(|(set, _)| set).collect();
     let outputs = vec![Output::Rates];
     count(&plan, &Options { outputs, modes: Some(ModeChoice::Listed(sets)), ..Options::default() }, out)?;
     Ok(writeln!(out, "\nmodes: {}", file.display())?)
+}
+
+/// Width of a column of sets of modes: there are two spaces after the longest, and room for the other entries.
+fn width(sets: impl Iterator<Item = String>) -> usize {
+    sets.map(|set| set.len() + 2).max().unwrap_or_default().max(40)
 }
 
 /// Operations and size of the code in every set of modes.
@@ -80,10 +86,11 @@ pub fn count(plan: &Plan, options: &Options, out: &mut dyn Write) -> Outcome {
     let names: Vec<&str> = plan.model.contacts.iter().map(|c| c.name.as_str()).collect();
     writeln!(out, "{}: contacts {}\n", plan.model.name, names.join(", "))?;
     writeln!(out, "Operations, and bytes of machine code, in sets of modes:")?;
-    writeln!(out, "{:<40}{:<24}{:>12}{:>10}", "modes", "output", "operations", "bytes")?;
+    let width = width(generated.sets.iter().map(|(set, _)| words(set)));
+    writeln!(out, "{:<width$}{:<24}{:>12}{:>10}", "modes", "output", "operations", "bytes")?;
     let mut line = |modes: &str, plan: &Plan, output: Output, operations: usize| -> Outcome {
         let bytes = bytes(plan.clone(), output)?;
-        Ok(writeln!(out, "{modes:<40}{:<24}{operations:>12}{bytes:>10}", output.name())?)
+        Ok(writeln!(out, "{modes:<width$}{:<24}{operations:>12}{bytes:>10}", output.name())?)
     };
     for (set, counts) in &generated.sets {
         let acting = full.acting(&rows_that_act(full.dims.rows, &full.contacts::<f64>(), set));
@@ -98,7 +105,7 @@ pub fn count(plan: &Plan, options: &Options, out: &mut dyn Write) -> Outcome {
     }
     for pieces in &generated.pieces {
         let mut line =
-            |what: &str, operations: usize| writeln!(out, "{what:<40}{:<24}{operations:>12}", pieces.output.name());
+            |what: &str, operations: usize| writeln!(out, "{what:<width$}{:<24}{operations:>12}", pieces.output.name());
         line(&format!("all, in {} pieces", pieces.count), pieces.operations)?;
         line("  executed where nothing touches", pieces.flight)?;
         line("  executed where everything sticks", pieces.stick)?;

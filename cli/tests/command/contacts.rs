@@ -170,6 +170,15 @@ fn modes_of_a_motion_are_found() {
     }
     assert_eq!(files(&folder), ["run.modes"]);
     good(run_in(&folder, &["generate", &hopper, "--modes", "run.modes", "-o", "hopper.rs"]));
+    // Sets of many contacts do not run into the next column.
+    let quadruped = shipped("quadruped");
+    let output = good(run_in(&folder, &["modes", &quadruped, "--time", "0.05", "--record", "run.modes"]));
+    let (_, table) = out(&output).split_once("in sets of modes:\n").expect("a table");
+    let outputs = table.find("output").expect("a column");
+    assert!(outputs > 40, "{table}");
+    for line in table.lines().take_while(|line| !line.is_empty()) {
+        assert!(line[..outputs].ends_with("  ") && !line[outputs..].starts_with(' '), "{table}");
+    }
     let pendulum = format!("{ROOT}/models/double_pendulum.toml");
     bad(run_in(&folder, &["modes", &pendulum]), &["`double_pendulum` has no contacts", "--limits"]);
     bad(run_in(&folder, &["modes", &hopper, "--contacts", "stepping"]), &["time steps visit no modes"]);
