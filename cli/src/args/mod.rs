@@ -400,7 +400,7 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive, conflicts_with = "rows")]
     pub every: Option<f64>,
     /// Columns of the table: `q`, `v`, `p`, `energy`, `tau` (joint forces of the control), `frames` (positions of all bodies and
-    /// frames, m), `multipliers`, `forces` (of contacts), or names of single columns; separated by commas
+    /// frames, m), `multipliers`, `reactions` (of joints), `forces` (of contacts), or names of single columns; separated by commas
     /// [default: q,v,p,energy, and tau under control]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub columns: Vec<String>,

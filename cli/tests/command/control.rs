@@ -266,6 +266,13 @@ fn columns_are_chosen() {
         run_in(&folder, &["simulate", &model, "--columns", "q,frame.tp.x"]),
         &["--columns: no column is named `frame.tp.x`", "did you mean `frame.tip.x`"],
     );
+    // The help names every group.
+    let help = good(run_in(&folder, &["simulate", "--help"]));
+    let (_, about) = out(&help).split_once("--columns <LIST>").expect("the option");
+    let (about, _) = about.split_once("--record-modes").expect("the next option");
+    for group in ["q", "v", "p", "energy", "tau", "frames", "multipliers", "reactions", "forces"] {
+        assert!(about.contains(&format!("`{group}`")), "{group}: {about}");
+    }
     bad(run_in(&folder, &["simulate", &model, "--columns", "tau"]), &["without control there are no joint forces"]);
     let loops = format!("{ROOT}/models/mechanisms/fourbar_equal.toml");
     run(&folder, &loops, &["--time", "0.5", "--columns", "multipliers"]);
