@@ -122,12 +122,13 @@ struct Part {
 /// Runs `mbd count`.
 pub fn run(args: &CountArgs, out: &mut dyn Write) -> Outcome {
     let Chosen { plan, candidates: tried } = source::chosen(&args.model, args.code.plan_options())?;
-    let options = args.code.options(&plan.model.name).of_model(!plan.constraints.is_empty());
+    let options = args.code.options(&plan.model.name);
     if let Some(argument) = &args.modes {
         let choice = Some(modes::choice(argument, Path::new(""), &plan.model)?);
         let options = Options { modes: choice, ..options }.of_model(true);
         return mentioned("making the code of every set of modes", || modes::count(&plan, &options, out));
     }
+    let options = options.of_model(!plan.constraints.is_empty());
     let counts = mentioned("counting the operations of every output", || all(&plan, &options))?;
     let loops = match is_large(&plan) {
         true => Vec::new(),

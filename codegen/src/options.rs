@@ -157,7 +157,8 @@ pub struct Options {
     pub precision: Precision,
     /// Whether joint forces `τ` are inputs. Without them they are zero and cost nothing.
     pub efforts: bool,
-    /// Names of the frames for outputs that have a result for each frame; empty means all.
+    /// Names of the frames for outputs that have a result for each frame; empty means all. Where none of these is asked for,
+    /// names of frames ask for [`Output::Frames`].
     pub frames: Vec<String>,
     /// Choice of the structure.
     pub plan: PlanOptions,
@@ -178,7 +179,8 @@ pub struct Options {
 impl Options {
     /// The options for a model with or without constraints: where the outputs are [`Output::DEFAULT`], or all of a
     /// model without constraints, a model with constraints also gets the outputs that only such models have, and not
-    /// those that they lack. Outputs that are listed more than once are there once.
+    /// those that they lack. Outputs that are listed more than once are there once. Names of frames ask for
+    /// [`Output::Frames`] where no output has a result for each frame.
     pub fn of_model(&self, constrained: bool) -> Options {
         let mut options = self.clone();
         let mut seen = BTreeSet::new();
@@ -194,6 +196,10 @@ impl Options {
         }
         if self.modes.is_some() && !options.outputs.contains(&Output::Gaps) {
             options.outputs.push(Output::Gaps);
+        }
+        // After the choice above, for which outputs must be those that were asked for.
+        if !self.frames.is_empty() && !options.outputs.iter().any(|output| output.spec().of_frames()) {
+            options.outputs.push(Output::Frames);
         }
         options
     }

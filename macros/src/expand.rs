@@ -8,7 +8,7 @@ use mbd_codegen::model::Model;
 use mbd_codegen::modes::{parse, ModeChoice};
 use mbd_codegen::read::{chosen, load_with, read_bytes, Base, ImportOptions, Variant};
 use mbd_codegen::words::{closest, did_you_mean, list, quote};
-use mbd_codegen::{generate, transfer_code, Output};
+use mbd_codegen::{generate, transfer_code};
 use proc_macro2::{Group as Tokens, Ident, Literal, Span, TokenStream, TokenTree};
 
 use crate::args::{self, Args, From, Modes, Name, Source};
@@ -266,10 +266,6 @@ fn judge(text: &Text, findings: &[Diagnostic], model: Option<&Model>, args: &mut
     for d in findings.iter().filter(|d| d.severity == Severity::Error) {
         let (message, help) = text.shown(d);
         errors.push(Message::new(text.place, message, help));
-    }
-    // Naming frames requests the output `frames`.
-    if !args.frames.is_empty() && !args.options.outputs.iter().any(|output| output.spec().of_frames()) {
-        args.options.outputs.push(Output::Frames);
     }
     let Some(model) = model else { return };
     let names = || model.bodies.iter().map(|b| b.name.as_str()).chain(model.frames.iter().map(|f| f.name.as_str()));

@@ -47,7 +47,8 @@ pub struct CodeArgs {
     /// Angles this close to right angles are taken as exact, rad; 0 keeps every number. Changes are reported
     #[arg(long, value_name = "RAD", default_value_t = DEFAULT_SNAP, allow_negative_numbers = true, value_parser = snap)]
     pub snap: f64,
-    /// Frames and bodies of outputs that have a result for each frame, separated by commas [default: all]
+    /// Frames and bodies of outputs that have a result for each frame, separated by commas; asks for the output `frames`
+    /// where none of these outputs is named [default: all]
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     pub frames: Vec<String>,
     /// Largest number of statements in one block of the generated code

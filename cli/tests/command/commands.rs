@@ -269,6 +269,28 @@ fn failures_leave_files_alone() {
     assert_eq!(read(&folder, "old.rs"), "as it was");
 }
 
+#[test]
+fn names_of_frames_ask_for_the_output_frames() {
+    let code = |model: &str, more: &[&str]| {
+        let output = good(run(&[&["generate", model], more].concat()));
+        out(&output).to_string()
+    };
+    let pendulum = "models/double_pendulum.toml";
+    assert!(!code(pendulum, &[]).contains("pub fn frames("));
+    let one = code(pendulum, &["--frames", "tip"]);
+    assert!(
+        one.contains("pub fn frames(")
+            && one.contains("pub fn momenta(")
+            && one.contains("position: &mut [[f64; 3]; 1]")
+    );
+    let jacobians = code(pendulum, &["--outputs", "rates,jacobians", "--frames", "tip"]);
+    assert!(!jacobians.contains("pub fn frames(") && jacobians.contains("pub fn jacobians("));
+    // A model with loops keeps the outputs that only such models have.
+    let loops = code("models/mechanisms/fourbar.toml", &["--frames", "coupler_point"]);
+    assert!(loops.contains("pub fn frames(") && loops.contains("pub fn constraint_residuals("));
+    bad(run(&["generate", pendulum, "--frames", "nose"]), &["no frame or body is named `nose`"]);
+}
+
 /// Names of the columns of a table, and its rows of numbers.
 fn columns(table: &str) -> (Vec<String>, Vec<Vec<f64>>) {
     let mut lines = table.lines();
