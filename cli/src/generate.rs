@@ -66,9 +66,10 @@ fn c_files(output: Option<&Path>) -> Outcome<CFiles> {
     let help = "name the source, as in -o robot.c; robot.h is written beside it";
     let Some(source) = output else { return Err(Failure::new("C is written to two files", help)) };
     let name = source.file_stem().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "_-.+ ".contains(c));
+    let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "_-".contains(c));
     if source.extension().is_none_or(|extension| extension != "c") || !plain {
-        let what = format!("`{}` is no name of a C source with letters, digits, `_` and `-`", source.display());
+        let rule = "made of letters from a to z, digits, `_` and `-`, with `.c` at the end";
+        let what = format!("`{}` is no name of a C source, {rule}", source.display());
         return Err(Failure::new(what, help));
     }
     Ok(CFiles { source: source.to_path_buf(), header: source.with_extension("h"), name })

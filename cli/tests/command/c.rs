@@ -83,6 +83,9 @@ fn failures_leave_both_files_alone() {
     let generate = |more: &[&str]| run_in(&folder, &[&["generate", &model, "--lang", "c"], more].concat());
     bad(generate(&[]), &["C is written to two files", "-o robot.c"]);
     bad(generate(&["-o", "robot.rs"]), &["`robot.rs` is no name of a C source"]);
+    for name in ["1 b.c", "ä.c", "a+b.c", "a.b.c"] {
+        bad(generate(&["-o", name]), &[&format!("`{name}` is no name of a C source"), "letters from a to z, digits"]);
+    }
     bad(generate(&["-o", "none/robot.c"]), &["cannot write `none/robot.c`"]);
     bad(generate(&["-o", "old.c", "--outputs", "frames", "--frames", "nose"]), &["no frame or body is named `nose`"]);
     assert_eq!((files(&folder), read(&folder, "old.c")), (vec!["old.c".to_string()], "as it was".to_string()));
