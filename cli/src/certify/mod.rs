@@ -36,6 +36,13 @@ const DEFAULT: [Quantity; 9] = [
 /// Runs `mbd certify`.
 pub fn run(args: &CertifyArgs, out: &mut dyn Write) -> Outcome {
     let plan = source::plan(&args.model, PlanOptions { snap: args.snap, ..PlanOptions::default() })?;
+    let of_loops = |what: &Quantity| matches!(what, Quantity::Residuals | Quantity::Multipliers);
+    if plan.dims.rows == 0 && args.outputs.iter().any(of_loops) {
+        return Err(Failure::new(
+            format!("--outputs: `{}` has no loops or couplings, and so neither `phi` nor `lambda`", plan.model.name),
+            "leave both out; without --outputs, all other outputs are bounded",
+        ));
+    }
     let region = input::read(&args.region, &plan)?;
     let wanted = match args.outputs.is_empty() {
         true => &DEFAULT[..],
