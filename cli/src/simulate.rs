@@ -104,9 +104,11 @@ pub fn run(args: &SimulateArgs, out: &mut dyn Write) -> Outcome {
     tables::known(&csv)?;
     writable(&csv)?;
     writable(&svg)?;
+    is_svg("--svg", &svg)?;
     let drawing = picture::drawing(&plan, args)?;
     if let Some(file) = &args.picture {
         of_its_own(("--picture", file), "the table or plot", &[&csv, &svg])?;
+        is_svg("--picture", file)?;
     }
     if let Some(file) = &args.record_modes {
         if settings.regimes.choice == RegimeChoice::TimeSteps {
@@ -229,6 +231,22 @@ fn of_its_own((option, file): (&str, &Path), holds: &str, others: &[&PathBuf]) -
         return Err(Failure::new(what, "give it a name of its own"));
     }
     writable(file)
+}
+
+/// Refuses the file of a drawing whose name ends as that of another format. A name without an ending, or with one that is no
+/// format's, promises nothing.
+fn is_svg(option: &str, file: &Path) -> Outcome {
+    const OTHERS: [&str; 18] = [
+        "bmp", "csv", "eps", "gif", "html", "jpeg", "jpg", "json", "mp4", "parquet", "pdf", "png", "ps", "svgz", "tif",
+        "tiff", "toml", "webp",
+    ];
+    match file.extension() {
+        Some(extension) if OTHERS.iter().any(|other| extension.eq_ignore_ascii_case(other)) => {
+            let what = format!("{option} {}: drawings are SVG, and the name is that of another format", file.display());
+            Err(Failure::new(what, "name a file that ends with `.svg`, and convert it with another program"))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Ends a command whose run was interrupted, after its files were written.

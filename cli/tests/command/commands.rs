@@ -342,6 +342,11 @@ fn results_of_a_simulation_are_files_of_their_own() {
         let output = run_in(&folder, &["simulate", &model, "--time", "0.1", "--picture", file]);
         bad(output, &["is to hold the table or plot already", "give it a name of its own"]);
     }
+    // Drawings are SVG, and no other format is promised.
+    for (option, file) in [("--picture", "a.png"), ("--picture", "a.PDF"), ("--svg", "a.jpeg"), ("--svg", "b.csv")] {
+        let output = run_in(&folder, &["simulate", &model, "--time", "0.1", option, file]);
+        bad(output, &[&format!("{option} {file}: drawings are SVG"), "ends with `.svg`"]);
+    }
     bad(
         run_in(&folder, &["simulate", &model, "--time", "0.1", "--csv", "a.csv", "--svg", "./a.csv"]),
         &["table and plot are both to be written to", "give --csv and --svg two names"],
