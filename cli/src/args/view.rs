@@ -9,7 +9,10 @@ use super::ImportArgs;
 
 /// `mbd view`.
 #[derive(Args)]
+// Options of the readers have no part in an empty page.
 #[command(
+    mut_arg("base", |arg| arg.requires("model")),
+    mut_arg("gravity", |arg| arg.requires("model")),
     after_help = "The page is one file without requests: it works without a network and without this program. It has the readers and the
 generator in it, so that any other model can be dropped on it. Without MODEL and FILE, an empty page for models to be dropped on
 is served to browsers of this machine, until Ctrl-C.
@@ -27,7 +30,7 @@ pub struct ViewArgs {
     #[command(flatten)]
     pub import: ImportArgs,
     /// Put a floor at this height that the collision shapes of a URDF or the geoms of an MJCF model touch, m
-    #[arg(long, value_name = "Z", allow_hyphen_values = true, value_parser = finite)]
+    #[arg(long, value_name = "Z", allow_hyphen_values = true, value_parser = finite, requires = "model")]
     pub floor: Option<f64>,
     /// File to write; `-` for standard output [default: that of the model, with .html]
     #[arg(short, long, value_name = "FILE")]

@@ -48,6 +48,13 @@ fn an_empty_page_takes_what_is_dropped() {
     assert!(page.len() <= LARGEST, "{} bytes", page.len());
     let printed = good(run_in(&folder, &["view", "-o", "-"]));
     assert_eq!(out(&printed), page);
+    // Options of the readers mean nothing for it.
+    for (option, value) in [("--base", "floating"), ("--floor", "0"), ("--gravity", "0,0,-9.81")] {
+        let output = run_in(&folder, &["view", option, value, "-o", "other.html"]);
+        assert_eq!(output.status.code(), Some(2), "{option}");
+        let told = err(&output);
+        assert!(told.contains("arguments were not provided") && told.contains("MODEL"), "{option}: {told}");
+    }
     assert_eq!(files(&folder), ["mbd-view.html"]);
 }
 
