@@ -43,8 +43,19 @@ pub fn read(path: &Path) -> Outcome<String> {
     })
 }
 
+/// Reads JSON from a file, or from standard input where its name is `-`. Returns the name for messages and the text, without the
+/// byte order mark that some editors put in front.
+pub fn json(path: &Path) -> Outcome<(String, String)> {
+    let (name, text) = match path.as_os_str() == "-" {
+        true => ("standard input".to_string(), standard_input()?),
+        false => (path.display().to_string(), read(path)?),
+    };
+    let unmarked = text.strip_prefix('\u{feff}').map(str::to_string);
+    Ok((name, unmarked.unwrap_or(text)))
+}
+
 /// Reads JSON from standard input.
-pub fn standard_input() -> Outcome<String> {
+fn standard_input() -> Outcome<String> {
     let mut text = String::new();
     let read = std::io::stdin().lock().take(LONGEST + 1).read_to_string(&mut text);
     read.map_err(|e| Failure::new(format!("cannot read standard input: {e}"), "pipe JSON in, as UTF-8"))?;

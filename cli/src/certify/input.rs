@@ -55,10 +55,7 @@ impl Region {
 
 /// Reads and checks a box. All findings of the file are reported at once.
 pub fn read(path: &Path, plan: &Plan) -> Outcome<Region> {
-    let (name, text) = match path.as_os_str() == "-" {
-        true => ("standard input".to_string(), source::standard_input()?),
-        false => (path.display().to_string(), source::read(path)?),
-    };
+    let (name, text) = source::json(path)?;
     let value: Value = serde_json::from_str(&text)
         .map_err(|e| Failure::new(format!("{name}:{}:{}: not JSON: {e}", e.line(), e.column()), SHAPE))?;
     let Value::Object(object) = &value else {

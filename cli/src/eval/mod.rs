@@ -77,10 +77,7 @@ impl Results {
 pub fn run(args: &EvalArgs, out: &mut dyn Write) -> Outcome {
     let plan = source::plan(&args.model, PlanOptions { snap: args.snap, ..PlanOptions::default() })?;
     let outer = Outer::new(&plan, args.layout);
-    let (name, text) = match args.input.as_os_str() == "-" {
-        true => ("standard input".to_string(), source::standard_input()?),
-        false => (args.input.display().to_string(), source::read(&args.input)?),
-    };
+    let (name, text) = source::json(&args.input)?;
     let inputs = input::read(&text, &plan, &outer).map_err(|findings| {
         for (place, what, help) in findings {
             note(format_args!("{name}{place}: error: {what}\n  help: {help}"));

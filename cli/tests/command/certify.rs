@@ -188,6 +188,8 @@ fn certify_prints_and_refuses() {
     let state = write(&folder, "state.json", r#"{"q": [0.1, 0.2], "v": [1, 1]}"#);
     let output = good(run(&["certify", pendulum, "--box", &state]));
     assert!(out(&output).contains(" ± ") && out(&output).contains("qdd.elbow"), "{}", out(&output));
+    let marked = write(&folder, "marked.json", "\u{feff}{\"q\": [0.1, 0.2]}");
+    good(run(&["certify", pendulum, "--box", &marked]));
     for outputs in ["phi", "M,lambda"] {
         let arguments = ["certify", pendulum, "--box", &state, "--outputs", outputs];
         bad(run(&arguments), &["--outputs: `double_pendulum` has no loops or couplings", "leave both out"]);

@@ -231,4 +231,8 @@ fn eval_picks_outputs_and_takes_all_inputs() {
     keys.sort();
     assert_eq!(keys, ["kinetic", "qdd"]);
     assert!(state["kinetic"].as_f64() > Some(0.0), "the panel turns");
+    // Some editors put a byte order mark in front.
+    let marked = write(&folder, "marked.json", &format!("\u{feff}{}", read(&folder, "in.json")));
+    let again = good(run(&["eval", "models/satellite.toml", "--input", &marked, "--outputs", "qdd,kinetic"]));
+    assert_eq!(out(&again), read(&folder, "out.json"));
 }
