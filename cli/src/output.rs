@@ -100,8 +100,15 @@ pub fn is_input(path: &Path) {
     }
 }
 
-/// Checks whether a file can be written, before its contents are computed. What was read as input is not.
+/// Checks whether a file can be written, before its contents are computed. What was read as input is not, and `-` is no file:
+/// the results that may go to standard output do not come here.
 pub fn writable(path: &Path) -> Outcome {
+    if path == Path::new("-") {
+        return Err(Failure::new(
+            "cannot write `-`: this result goes to a file, not to standard output",
+            "name a file; `./-` is one of that name",
+        ));
+    }
     let target = std::fs::canonicalize(path).ok().filter(|target| target.is_file());
     let read = READ.lock().unwrap_or_else(PoisonError::into_inner);
     if target.is_some_and(|target| read.contains(&target)) {

@@ -633,6 +633,12 @@ fn inputs_are_not_overwritten() {
     assert_eq!(read(&folder, "m.toml"), text);
     assert_eq!(read(&folder, "s.json"), states);
     assert_eq!(files(&folder), ["m.toml", "s.json"]);
+    // Beside the report, standard output takes no table.
+    for option in ["--csv", "--svg", "--picture"] {
+        let output = run_in(&folder, &["simulate", "m.toml", "--time", "0.1", option, "-"]);
+        bad(output, &["cannot write `-`", "name a file"]);
+    }
+    assert_eq!(files(&folder), ["m.toml", "s.json"]);
     // A dash is standard output.
     let code = good(run_in(&folder, &["generate", "m.toml", "-o", "-"]));
     assert!(out(&code).contains("pub fn rates") || out(&code).contains("fn rates"), "{}", out(&code));
