@@ -17,8 +17,8 @@ const IGNORED: [(&str, &str); 2] =
 const UNUSED_LIMIT: &str =
     "`limit` makes no stops (`--limits` of `mbd simulate` asks for them); it bounds motion under control";
 
-/// Reads a `joint`, with its `limits` as stops where they are asked for. Without a name, a parent or a child it is reported and left out.
-pub(super) fn read(reader: &mut Reader, node: Node, limits: bool) -> Option<RawJoint> {
+/// Reads a `joint`, with its limits as stops where they are `asked` for. Without a name, a parent or a child it is reported and left out.
+pub(super) fn read(reader: &mut Reader, node: Node, asked: bool) -> Option<RawJoint> {
     reader.attributes(node, &["name", "type"]);
     let name = reader.required(node, "name", "");
     let whose = name.as_ref().map_or(String::new(), |n| format!("joint {}: ", quote(n.value)));
@@ -31,7 +31,7 @@ pub(super) fn read(reader: &mut Reader, node: Node, limits: bool) -> Option<RawJ
     let axis = read_axis(reader, node, axis, kind.as_ref().map(|k| k.value), &whose);
     let damping = dynamics.and_then(|d| read_dynamics(reader, d, kind.as_ref().map(|k| k.value), &whose));
     let mimic = mimic.and_then(|m| read_mimic(reader, m, kind.as_ref().map(|k| k.value), &whose));
-    let limits = limit.and_then(|l| read_limit(reader, l, kind.as_ref().map(|k| k.value), limits, &whose));
+    let limits = limit.and_then(|l| read_limit(reader, l, kind.as_ref().map(|k| k.value), asked, &whose));
     let name = name?;
     let unbounded = node.attribute("type") == Some("continuous");
     let mut joint = RawJoint::new(Spanned::new(name.value.to_string(), name.span), kind, Some(child?));
@@ -44,7 +44,7 @@ pub(super) fn read(reader: &mut Reader, node: Node, limits: bool) -> Option<RawJ
     joint.limits = limits.filter(|_| !unbounded && mimic.is_none());
     joint.mimic = mimic;
     if let Some(limit) = limit {
-        bounds(&mut joint, limit);
+        bounds(reader, &mut joint, limit, asked, &whose);
     }
     Some(joint)
 }
@@ -160,37 +160,55 @@ fn read_limit(
     let (lower, upper) = (lower.unwrap_or_else(zero), upper.unwrap_or_else(zero));
     if let (RawValue::Const(a), RawValue::Const(b)) = (&lower.value, &upper.value) {
         if a >= b {
-            let message = format!("{whose}`limit` from {a} to {b} is not used");
-            reader.findings.warning(place(node), message, "write a `lower` that is less than `upper`");
+            unordered(reader, node, [*a, *b], whose);
             return None;
         }
     }
     Some(RawLimits { span, lower: Some(lower), upper: Some(upper) })
 }
 
-/// What a joint is made for. Files are careless about it: zeros and what is no number say nothing.
-fn bounds(joint: &mut RawJoint, node: Node) {
+/// Says that a limit is not used because its ends are not in rising order.
+fn unordered(reader: &mut Reader, node: Node, [lower, upper]: [f64; 2], whose: &str) {
+    let message = format!("{whose}`limit` from {lower} to {upper} is not used");
+    let help = "write a `lower` that is less than `upper`";
+    reader.tally.add(Severity::Warning, "unordered limit", place(node), message, help);
+}
+
+/// What a joint is made for. Files are careless about it: zeros and what is no number say nothing. Ends in the wrong order
+/// have been reported already where stops are `asked` for.
+fn bounds(reader: &mut Reader, joint: &mut RawJoint, node: Node, asked: bool, whose: &str) {
     /// Numbers beyond this are meant as none.
     const LARGEST: f64 = 1e30;
-    let number = |key: &str| {
-        let x = node.attribute(key)?.trim().parse::<f64>().ok()?;
-        (x.abs() < LARGEST).then(|| Spanned::new(RawValue::Const(x), place(node)))
+    let number = |key: &str| node.attribute(key)?.trim().parse::<f64>().ok().filter(|x| x.abs() < LARGEST);
+    let raw = |x: f64| RawNumber::constant(x, place(node));
+    let mut greatest = |key: &str, what: &str| {
+        let x = number(key)?;
+        if x < 0.0 {
+            let span = reader.attribute(node, key).map_or(place(node), |text| text.span);
+            let message = format!("{whose}`{key}` {x} of `limit` is not used: it is less than 0");
+            let help = format!("write the greatest {what} as a positive number, or 0 where it is not known");
+            reader.tally.add(Severity::Warning, &format!("negative {key}"), span, message, help);
+        }
+        (x > 0.0).then(|| raw(x))
     };
-    let positive = |key: &str| number(key).filter(|x| matches!(x.value, RawValue::Const(x) if x > 0.0));
     let Some(spec) = joint.kind.as_ref().map(|k| k.value).filter(|spec| spec.nv() > 0) else { return };
-    (joint.max_velocity, joint.max_effort) = (positive("velocity"), positive("effort"));
-    let single = spec.nv() == 1 && !joint.unbounded && joint.mimic.is_none();
+    joint.max_velocity = greatest("velocity", "speed");
+    joint.max_effort = greatest("effort", "force or torque");
+    if spec.nv() != 1 || joint.unbounded || joint.mimic.is_some() {
+        return;
+    }
     // Of the two, the one that is not stated is zero.
     let ends = ["lower", "upper"].map(|key| match node.attribute(key) {
-        None => Some(Spanned::new(RawValue::Const(0.0), place(node))),
+        None => Some(0.0),
         Some(_) => number(key),
     });
-    if let (true, [Some(lower), Some(upper)]) = (single, ends) {
+    let [Some(lower), Some(upper)] = ends else { return };
+    if lower < upper {
         let range = node.range();
-        if matches!((&lower.value, &upper.value), (RawValue::Const(a), RawValue::Const(b)) if a < b) {
-            let span = Span::new(range.start, range.end);
-            joint.range = Some(RawLimits { span, lower: Some(lower), upper: Some(upper) });
-        }
+        let span = Span::new(range.start, range.end);
+        joint.range = Some(RawLimits { span, lower: Some(raw(lower)), upper: Some(raw(upper)) });
+    } else if lower > upper && !asked {
+        unordered(reader, node, [lower, upper], whose);
     }
 }
 

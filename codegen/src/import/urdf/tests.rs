@@ -269,6 +269,38 @@ fn limits_bound_motion_where_they_say_something() {
     }
 }
 
+/// What is wrong with a limit is told once, whether stops are asked for or not.
+#[test]
+fn limits_without_sense_are_told_once() {
+    let told = |limit: &str, limits: bool| {
+        let limited = |name: &str, child: &str| joint(name, "revolute", "base", child, &format!("<limit {limit}/>"));
+        let links = ["base", "one", "two"].map(link).concat();
+        let text = format!("<robot name='r'>{links}{}{}</robot>", limited("a", "one"), limited("b", "two"));
+        let (_, findings) = load("r.urdf", &text, &ImportOptions { limits, ..ImportOptions::default() });
+        let warnings = findings.0.into_iter().filter(|d| d.severity == Severity::Warning);
+        warnings.map(|d| d.message).collect::<Vec<_>>()
+    };
+    for limits in [false, true] {
+        for (limit, wanted) in [
+            ("lower='2' upper='-1'", "joint `a`: `limit` from 2 to -1 is not used (2 times, first here)"),
+            ("upper='-1'", "joint `a`: `limit` from 0 to -1 is not used (2 times, first here)"),
+            (
+                "velocity='-3'",
+                "joint `a`: `velocity` -3 of `limit` is not used: it is less than 0 (2 times, first here)",
+            ),
+            ("effort='-4'", "joint `a`: `effort` -4 of `limit` is not used: it is less than 0 (2 times, first here)"),
+        ] {
+            assert_eq!(told(limit, limits), [wanted], "{limit}, {limits}");
+        }
+        for limit in ["lower='-1' upper='2' velocity='3' effort='4'", "velocity='0' effort='0'", "velocity='-0.0'"] {
+            assert_eq!(told(limit, limits), [""; 0], "{limit}, {limits}");
+        }
+    }
+    // A limit without a length makes no stops, and says nothing where none are asked for.
+    assert_eq!(told("lower='0' upper='0'", false), [""; 0]);
+    assert_eq!(told("lower='0' upper='0'", true), ["joint `a`: `limit` from 0 to 0 is not used (2 times, first here)"]);
+}
+
 /// A robot with every kind of shape, a joint with limits, and one that follows it.
 const TOUCHING: &str = r#"<robot name='r'>
   <link name='base'>
