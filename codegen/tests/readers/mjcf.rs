@@ -337,6 +337,25 @@ fn flags_have_known_names() {
     assert!(findings.contains("unknown attribute `gravty`"), "{findings}");
 }
 
+/// What of `option` is not used is named, and nothing is said where all of it is.
+#[test]
+fn options_that_are_not_used_are_named() {
+    let told = |option: &str| {
+        let (_, findings) =
+            model(&format!("{option}<worldbody><body name='a'><joint name='j'/>{BALL}</body></worldbody>"));
+        let lines = findings.lines().filter(|line| line.contains("of `option`"));
+        lines.filter_map(|line| line.split_once("notice: ")).map(|(_, told)| told.to_string()).collect::<Vec<_>>()
+    };
+    for used in ["<option gravity='0 0 -5'/>", "<option/>", "<option><flag contact='disable'/></option>"] {
+        assert_eq!(told(used), [""; 0], "{used}");
+    }
+    assert_eq!(told("<option gravity='0 0 -5' solver='CG'/>"), ["`solver` of `option` is not used"]);
+    assert_eq!(
+        told("<option integrator='RK4' timestep='0.001'/>"),
+        ["`timestep` and `integrator` of `option` are not used"]
+    );
+}
+
 #[test]
 fn flags_switch_off_what_acts() {
     let text = format!(

@@ -4,6 +4,7 @@ use super::element::{choice, flag, number, numbers, vec3, Element};
 use super::pose::sequence;
 use crate::diag::Severity;
 use crate::import::source::Spanned;
+use crate::import::words::list;
 use crate::import::xml::{place, Reader};
 use roxmltree::Node;
 
@@ -221,11 +222,19 @@ impl Options {
         if !self.on("constraint") {
             self.off.extend(["equality", "limit"].map(String::from));
         }
-        reader.tally.notice(place(node), "the integrator and the solver of `option` are not used");
+        let stated = |key: &&str| !ACTING.contains(key) && node.attribute(*key).is_some();
+        let unused: Vec<&str> = OPTION.iter().copied().filter(stated).collect();
+        if !unused.is_empty() {
+            let are = if unused.len() == 1 { "is" } else { "are" };
+            reader.tally.notice(place(node), &format!("{} of `option` {are} not used", list(unused)));
+        }
     }
 }
 
-/// Attributes of `option`; the settings of MuJoCo's integrators and solvers are not read.
+/// Attributes of `option` that are read.
+const ACTING: [&str; 3] = ["gravity", "density", "viscosity"];
+
+/// Attributes of `option`; those of MuJoCo's integrators and solvers, and all others that are not [`ACTING`], are not used.
 const OPTION: &[&str] = &[
     "timestep",
     "impratio",
