@@ -222,7 +222,13 @@ fn damaged_meshes_are_refused() {
         said("m.obj", bytes, wanted);
     }
     said("m.dae", b"", "meshes are read from STL and OBJ files");
-    said("../m.stl", b"", "`meshes/../m.stl`: it cannot be read");
+    // Of a file that is not there, the path is to be mended; of one that is damaged, the mesh.
+    said(
+        "../m.stl",
+        b"",
+        "`meshes/../m.stl`: it cannot be read: entity not found\n  help: the path is relative to the folder of this file",
+    );
+    said("m.obj", b"", "the mesh has no points\n  help: write the mesh anew by the program that made it");
 }
 
 #[test]

@@ -41,8 +41,8 @@ pub(super) fn read(table: &Table, options: &ImportOptions, findings: &mut Findin
     let text = match text(files, &path) {
         Ok(text) => text,
         Err(error) => {
-            let help = "the path is relative to the folder of this file";
-            findings.error(name.span, format!("cannot read the base {}: {error}", quote(&name.value)), help);
+            let message = format!("cannot read the base {}: {error}", quote(&name.value));
+            findings.error(name.span, message, super::PATH);
             return None;
         }
     };

@@ -3,7 +3,6 @@
 use mbd_runtime::contact::RestitutionLaw;
 
 use super::super::hull;
-use super::super::mesh::Problem;
 use super::super::raw::{RawContact, RawHull, RawModel, RawShape, RawSurface, RawValue};
 use super::super::source::{Findings, Spanned};
 use super::super::words::quote;
@@ -137,10 +136,9 @@ fn corners(table: &Table, named: &Named, findings: &mut Findings) -> Option<Vec<
         (true, false) => (points?, None),
         (false, _) => {
             let file = file?;
-            let path = named.folder.join(&file.value);
-            let bytes = (named.files)(&path).map_err(|error| Problem::whole(format!("it cannot be read: {error}")));
             let factor = factor?;
-            match bytes.and_then(|bytes| hull::of_mesh(&path, &bytes, [factor; 3])) {
+            let (path, bytes) = named.read(&file, &table.prefix(), findings)?;
+            match hull::of_mesh(&path, &bytes, [factor; 3]) {
                 Ok(points) => (points, Some(file)),
                 Err(problems) => {
                     hull::report(&problems, &path, &file, &table.prefix(), findings);

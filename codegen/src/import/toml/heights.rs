@@ -128,16 +128,9 @@ fn of_file(
     named: &Named,
     findings: &mut Findings,
 ) -> Option<Vec<Vec<f64>>> {
-    let path = named.folder.join(&file.value);
+    let (path, bytes) = named.read(file, what, findings)?;
     let name = quote(&file.value);
     let help = "write a row of heights in each line, with commas or spaces between them";
-    let bytes = match (named.files)(&path) {
-        Ok(bytes) => bytes,
-        Err(error) => {
-            findings.error(file.span, format!("{what}{name}: it cannot be read: {error}"), help);
-            return None;
-        }
-    };
     let Ok(text) = String::from_utf8(bytes) else {
         findings.error(file.span, format!("{what}{name}: it is no text"), help);
         return None;

@@ -51,6 +51,24 @@ struct Named<'f> {
     is_base: bool,
 }
 
+/// What to do about a file that cannot be read.
+const PATH: &str = "the path is relative to the folder of this file";
+
+impl Named<'_> {
+    /// The path of a file and what it contains; that it cannot be read is reported, as of `what`.
+    fn read(&self, file: &Spanned<String>, what: &str, findings: &mut Findings) -> Option<(PathBuf, Vec<u8>)> {
+        let path = self.folder.join(&file.value);
+        match (self.files)(&path) {
+            Ok(bytes) => Some((path, bytes)),
+            Err(error) => {
+                let message = format!("{what}{}: it cannot be read: {error}", quote(&file.value));
+                findings.error(file.span, message, PATH);
+                None
+            }
+        }
+    }
+}
+
 /// Reports options that a model without `[base]` states itself.
 fn refuse_options(options: &ImportOptions, findings: &mut Findings) {
     if options.base != Base::default() {
