@@ -89,12 +89,46 @@ fn findings_name_the_file_they_are_about() {
         ("[base]\n", "`file`"),
         ("[base]\nfile = 'nested.toml'\n", "robots/nested.toml:1:1: error: the base of a model has a `[base]` itself"),
         ("[base]\nfile = 'arm.urdf'\nroot = 'flying'\n", "`root` cannot be `flying`"),
-        ("[base]\nfile = 'arm.urdf'\n[[joint]]\nname = 'elbow'\ndamping = 1\n", "robots/changed.toml:3:1: error"),
     ] {
         let (model, findings, severities) = read(text);
         assert!(model.is_none() && severities.contains(&Severity::Error), "{text}: {findings}");
         assert!(findings.contains(expected), "{expected}: {findings}");
     }
+}
+
+/// A name that the base does not have is told as that, once, and not by all that a new joint or body lacks.
+#[test]
+fn names_that_the_base_does_not_have_are_told() {
+    for (text, expected) in [
+        (
+            "[[joint]]\nname = 'sholder'\ndamping = 1\n",
+            "robots/changed.toml:4:8: error: joint `sholder`: no joint of the base has this name\n  \
+             help: did you mean `shoulder`? a new joint needs `type` and `child`",
+        ),
+        (
+            "[[joint]]\nname = 'wrist'\ntype = 'fixed'\n",
+            "robots/changed.toml:4:8: error: joint `wrist`: no joint of the base has this name\n  \
+             help: the joints of the base are `root_joint` and `shoulder`; a new joint needs `type` and `child`",
+        ),
+        (
+            "[[body]]\nname = 'uper'\nmass = 1\n",
+            "robots/changed.toml:4:8: error: body `uper`: no body of the base has this name\n  \
+             help: did you mean `upper`? a new body needs a joint whose `child` it is",
+        ),
+        (
+            "[[body]]\nname = 'hand'\nmass = 1\n",
+            "robots/changed.toml:4:8: error: body `hand`: no body of the base has this name\n  \
+             help: the bodies of the base are `base` and `upper`; a new body needs a joint whose `child` it is",
+        ),
+    ] {
+        let (model, findings, _) = read(&format!("[base]\nfile = 'arm.urdf'\n{text}"));
+        assert!(model.is_none() && findings.contains(expected), "{text}: {findings}");
+        assert_eq!(findings.matches(": error: ").count(), 1, "{text}: {findings}");
+    }
+    // A joint that is named twice is no misspelt one.
+    let twice = "[[joint]]\nname = 'shoulder'\ndamping = 1\n";
+    let (model, findings, _) = read(&format!("[base]\nfile = 'arm.urdf'\n{twice}{twice}"));
+    assert!(model.is_none() && !findings.contains("no joint of the base"), "{findings}");
 }
 
 #[test]

@@ -1,13 +1,13 @@
 //! `[base]`: a description as changes and additions of another one, of a robot in URDF above all.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use super::table::Table;
 use super::Named;
 use crate::import::raw::{RawBody, RawJoint, RawModel, RawMotion};
-use crate::import::source::{Findings, Span};
-use crate::import::words::quote;
+use crate::import::source::{Findings, Span, Spanned};
+use crate::import::words::{closest, list, quote};
 use crate::import::{mjcf, text, urdf, Base, ImportOptions, XmlFormat};
 
 pub(super) const KEYS: &[&str] = &["file", "root", "limits"];
@@ -19,6 +19,9 @@ pub(super) struct Known {
     pub bodies: HashMap<String, usize>,
     /// Joints.
     pub joints: HashMap<String, usize>,
+    /// Numbers of the bodies and joints of the base, which stand before those that are added; none where a part of the base
+    /// was left out, so that it cannot be told which names it has.
+    counts: [usize; 2],
 }
 
 impl Known {
@@ -26,7 +29,48 @@ impl Known {
     pub fn of(raw: &RawModel) -> Known {
         let bodies = raw.bodies.iter().enumerate().map(|(k, body)| (body.name.value.clone(), k));
         let joints = raw.joints.iter().enumerate().map(|(k, joint)| (joint.name.value.clone(), k));
-        Known { bodies: bodies.collect(), joints: joints.collect() }
+        let counts = if raw.incomplete { [0; 2] } else { [raw.bodies.len(), raw.joints.len()] };
+        Known { bodies: bodies.collect(), joints: joints.collect(), counts }
+    }
+
+    /// Reports a joint that is not described as a new one where the base has none of its name; whether it did.
+    pub fn lacks_joint(&self, name: &Spanned<String>, raw: &RawModel, findings: &mut Findings) -> bool {
+        let of_base = &raw.joints[..self.counts[1]];
+        if of_base.is_empty() || raw.joints.iter().any(|joint| joint.name.value == name.value) {
+            return false;
+        }
+        let names = of_base.iter().map(|joint| joint.name.value.as_str()).collect();
+        let message = format!("joint {}: no joint of the base has this name", quote(&name.value));
+        let help = meant(&name.value, names, "joints", "a new joint needs `type` and `child`");
+        findings.error(name.span, message, help);
+        true
+    }
+
+    /// Reports bodies that no joint carries where the base has none of their names.
+    pub fn lacks_bodies(&self, raw: &mut RawModel, findings: &mut Findings) {
+        let (of_base, added) = raw.bodies.split_at(self.counts[0]);
+        if of_base.is_empty() || raw.incomplete {
+            return;
+        }
+        let children = raw.joints.iter().filter_map(|joint| joint.child.as_ref());
+        let carried: HashSet<&str> = children.map(|child| child.value.as_str()).collect();
+        for body in added.iter().filter(|body| !carried.contains(body.name.value.as_str())) {
+            let name = &body.name;
+            let names = of_base.iter().map(|body| body.name.value.as_str()).collect();
+            let message = format!("body {}: no body of the base has this name", quote(&name.value));
+            let help = meant(&name.value, names, "bodies", "a new body needs a joint whose `child` it is");
+            findings.error(name.span, message, help);
+            // That it has no joint is not reported again.
+            raw.incomplete = true;
+        }
+    }
+}
+
+/// What to do about a name that is none of those of the base.
+fn meant(name: &str, names: Vec<&str>, kind: &str, otherwise: &str) -> String {
+    match closest(name, names.iter().copied()) {
+        Some(meant) => format!("did you mean {}? {otherwise}", quote(meant)),
+        None => format!("the {kind} of the base are {}; {otherwise}", list(names)),
     }
 }
 

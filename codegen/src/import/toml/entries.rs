@@ -146,13 +146,20 @@ pub(super) fn joint(table: Table, known: &mut Known, raw: &mut RawModel, finding
     table.reject_unknown(JOINT, "a joint", findings);
     let name = table.required_text("name", findings);
     let at = name.as_ref().and_then(|name| known.joints.remove(&name.value));
+    let described = at.is_some() || (table.has("type") && table.has("child"));
+    let misspelt = match &name {
+        Some(name) if !described => known.lacks_joint(name, raw, findings),
+        _ => false,
+    };
     let of_base = at.map(|at| &raw.joints[at]);
     let kind = match of_base.filter(|_| !table.has("type")) {
         Some(of_base) => of_base.kind.clone(),
+        None if misspelt && !table.has("type") => None,
         None => kind(&table, &JOINTS, |spec| &spec.words, |_| None, findings),
     };
     let child = match of_base.filter(|_| !table.has("child")) {
         Some(of_base) => of_base.child.clone(),
+        None if misspelt => table.text("child", findings),
         None => table.required_text("child", findings),
     };
     // Without its joint, the body would be reported as having none.

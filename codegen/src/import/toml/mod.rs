@@ -145,6 +145,7 @@ fn parts(
     for table in top.tables("joint", findings) {
         entries::joint(table, known, raw, findings);
     }
+    known.lacks_bodies(raw, findings);
     for table in top.tables("frame", findings) {
         entries::frame(table, raw, findings);
     }
