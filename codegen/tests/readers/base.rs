@@ -25,6 +25,10 @@ fn read(text: &str) -> (Option<Model>, String, Vec<Severity>) {
             Ok(ROBOT.replace("'0.02' ixy", "'-0.02' ixy").replace("mass value='2'", "mass value='x'").into_bytes())
         }
         "robots/rubs.toml" => Ok(RUBS.as_bytes().to_vec()),
+        "robots/ball.xml" => {
+            Ok(b"<mujoco><worldbody><body name='ball'><freejoint/><geom size='0.1'/></body></worldbody></mujoco>"
+                .to_vec())
+        }
         "robots/nested.toml" => Ok(b"[base]\nfile = 'arm.urdf'\n".to_vec()),
         _ => Err(Error::new(ErrorKind::NotFound, "no such file")),
     };
@@ -89,10 +93,34 @@ fn findings_name_the_file_they_are_about() {
         ("[base]\n", "`file`"),
         ("[base]\nfile = 'nested.toml'\n", "robots/nested.toml:1:1: error: the base of a model has a `[base]` itself"),
         ("[base]\nfile = 'arm.urdf'\nroot = 'flying'\n", "`root` cannot be `flying`"),
+        (
+            "[base]\nfile = 'rubs.toml'\nroot = 'floating'\n",
+            "robots/changed.toml:3:1: error: `base`: `root` is for URDF files\n  \
+             help: remove it: the joints to `ground` say how the model is attached in `rubs.toml`",
+        ),
+        (
+            "[base]\nfile = 'ball.xml'\nroot = 'planar'\n",
+            "robots/changed.toml:3:1: error: `base`: `root` is for URDF files\n  \
+             help: remove it: the joints of the bodies say how the model is attached in `ball.xml`",
+        ),
+        (
+            "[base]\nfile = 'rubs.toml'\nlimits = true\n",
+            "robots/changed.toml:3:1: error: `base`: `limits` is for URDF and MJCF files\n  \
+             help: remove it: the `limits` of joints are stops already in `rubs.toml`",
+        ),
     ] {
         let (model, findings, severities) = read(text);
         assert!(model.is_none() && severities.contains(&Severity::Error), "{text}: {findings}");
         assert!(findings.contains(expected), "{expected}: {findings}");
+        assert!(!findings.contains("option"), "no option was given: {findings}");
+    }
+    // Keys that say what is so anyway.
+    for text in [
+        "[base]\nfile = 'rubs.toml'\nroot = 'fixed'\nlimits = false\n",
+        "[base]\nfile = 'ball.xml'\nroot = 'fixed'\nlimits = true\n",
+    ] {
+        let (model, findings, _) = read(text);
+        assert!(model.is_some(), "{text}: {findings}");
     }
 }
 

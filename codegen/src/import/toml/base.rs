@@ -78,8 +78,8 @@ fn meant(name: &str, names: Vec<&str>, kind: &str, otherwise: &str) -> String {
 pub(super) fn read(table: &Table, options: &ImportOptions, findings: &mut Findings, named: &Named) -> Option<RawModel> {
     let files = named.files;
     table.reject_unknown(KEYS, "a base", findings);
-    let root = table.choice("root", &Base::ALL.map(Base::name), findings).map(|choice| Base::ALL[choice.value]);
-    let limits = table.flag("limits", findings).is_some_and(|flag| flag.value);
+    let mut root = table.choice("root", &Base::ALL.map(Base::name), findings).map(|choice| Base::ALL[choice.value]);
+    let mut limits = table.flag("limits", findings).is_some_and(|flag| flag.value);
     let name = table.required_text("file", findings)?;
     let path = named.folder.join(&name.value);
     let text = match text(files, &path) {
@@ -90,19 +90,34 @@ pub(super) fn read(table: &Table, options: &ImportOptions, findings: &mut Findin
             return None;
         }
     };
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let is_toml = extension.as_deref() == Some("toml");
+    let is_mjcf = match extension.as_deref() {
+        Some("xml") => XmlFormat::of(&text) == Some(XmlFormat::Mjcf),
+        other => other == Some("mjcf"),
+    };
+    let refuse = |key: &str, formats: &str, instead: &str, findings: &mut Findings| {
+        let message = format!("{}`{key}` is for {formats}", table.prefix());
+        findings.error(table.key_span(key), message, format!("remove it: {instead} in {}", quote(&name.value)));
+    };
+    if (is_toml || is_mjcf) && root.is_some_and(|root| root != Base::default()) {
+        let joints = if is_toml { "the joints to `ground`" } else { "the joints of the bodies" };
+        refuse("root", "URDF files", &format!("{joints} say how the model is attached"), findings);
+        root = None;
+    }
+    if is_toml && limits {
+        refuse("limits", "URDF and MJCF files", "the `limits` of joints are stops already", findings);
+        limits = false;
+    }
     // What the caller states goes first.
     let base = if options.base == Base::default() { root.unwrap_or_default() } else { options.base };
     let options = ImportOptions { base, gravity: None, limits: limits || options.limits, ..*options };
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     let placed = |text: &str, findings: &mut Findings| {
         let start = findings.add_base(&path.to_string_lossy(), text.to_string());
         format!("{}{}", " ".repeat(start), without_start(text))
     };
     match extension.as_deref() {
-        Some("mjcf") => mjcf::read(&placed(&text, findings), &options, findings, files),
-        Some("xml") if XmlFormat::of(&text) == Some(XmlFormat::Mjcf) => {
-            mjcf::read(&placed(&text, findings), &options, findings, files)
-        }
+        _ if is_mjcf => mjcf::read(&placed(&text, findings), &options, findings, files),
         Some("urdf" | "xml") => urdf::read(&placed(&text, findings), &options, findings, (&path, files)),
         Some("toml") => {
             super::refuse_options(&options, findings);
