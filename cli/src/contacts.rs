@@ -158,14 +158,16 @@ impl ContactObserver<Mechanism> for Observer {
             Some((_, time)) => *time += end - begin,
             None => self.visits.push((system.modes().to_vec(), end - begin)),
         }
-        while self.next() <= end && self.record.t.last().is_some_and(|last| *last < self.time) {
+        // A row that differs from the end by rounding only is at the end.
+        let near = end + 1e-9 * (end - begin);
+        while self.next() <= near && self.record.t.last().is_some_and(|last| *last < self.time) {
             if interrupt::asked() {
                 self.cut = true;
                 break;
             }
             let t = self.next();
             let (mut q, mut p) = (std::mem::take(&mut self.q), std::mem::take(&mut self.p));
-            stretch.state(system, t, &mut q, &mut p);
+            stretch.state(system, t.min(end), &mut q, &mut p);
             (self.q, self.p) = (q, p);
             self.row(system, t);
         }

@@ -321,14 +321,14 @@ pub fn rivals(plan: &Plan, counts: &[OutputCounts], out: &mut dyn Write) -> Outc
 
 /// Differences of the count of one output when parts of the model are left out.
 fn parts(plan: &Plan, options: &Options, group: Output) -> Outcome<Vec<Part>> {
+    // The operations of the sweeps, because rewriting would hide the differences.
+    let options = &Options { arithmetic: Arithmetic::Exact, ..options.clone() };
     let total = |plan: &Plan, options: &Options| -> Outcome<usize> { Ok(code(plan, group, options)?.counts().total()) };
     let changed = |change: &dyn Fn(&mut Model)| -> Outcome<usize> {
         let mut model = plan.model.clone();
         change(&mut model);
         total(&search::plan(&model, options.searches()), options)
     };
-    // The operations of the sweeps, because rewriting would hide the differences.
-    let options = &Options { arithmetic: Arithmetic::Exact, ..options.clone() };
     let here = total(plan, options)?;
     let mut parts = Vec::new();
     let mut part = |what, operations, present| {

@@ -256,6 +256,24 @@ pub fn in_words(record: &Record) -> Option<String> {
     })
 }
 
+/// Change of coordinates, rad or m, and velocities, rad/s or m/s, up to which a run with fixed steps is one at rest.
+const UNMOVED: f64 = 1e-12;
+
+/// How far coordinates have moved, where no row of the table shows more than what rounding and the tolerance make of a mechanism
+/// at rest. Its energies are errors then, all of them, and measure nothing.
+fn at_rest(record: &Record, settings: &Settings) -> Option<f64> {
+    let allowed = match settings.step {
+        Step::Adaptive(tolerances) => tolerances.rotations,
+        Step::Fixed(_) => UNMOVED,
+    };
+    let start = record.q.first()?;
+    let largest = |most: f64, x: f64| if x > most || x.is_nan() { x } else { most };
+    let changes = record.q.iter().flat_map(|q| q.iter().zip(start)).map(|(q, start)| (q - start).abs());
+    let moved = changes.fold(0.0, largest);
+    let speed = record.v.iter().flatten().map(|v| v.abs()).fold(0.0, largest);
+    (moved <= allowed && speed <= allowed).then_some(moved)
+}
+
 /// Judges a run by its energy.
 pub fn judge(record: &Record, settings: &Settings) -> Verdict {
     let (balance, ends, steps) = (&record.balance, &record.ends, record.statistics.steps);
@@ -263,6 +281,13 @@ pub fn judge(record: &Record, settings: &Settings) -> Verdict {
     let change = format!("{:.1e} of the largest kinetic energy, {:.3e} J", ends.worst(), ends.scale);
     if settings.project {
         let line = format!("energy error: at most {change}; --project keeps it, so that it does not measure this run");
+        return Verdict { line, warning: None, lost: false };
+    }
+    if let Some(moved) = at_rest(record, settings) {
+        let line = format!(
+            "energy error: at most {:.1e} J; the mechanism is at rest, no coordinate moves by more than {moved:.1e}",
+            balance.worst.max(ends.change.iter().fold(0.0, |m: f64, x| m.max(x.abs())))
+        );
         return Verdict { line, warning: None, lost: false };
     }
     let [dampers, control] = balance.works;

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use multibody::codegen::jit::Compiled;
+use multibody::codegen::jit::{CompileError, Compiled};
 use multibody::codegen::model::Model;
 use multibody::codegen::modes::{self, words, ModeChoice};
 use multibody::codegen::plan::Plan;
@@ -78,11 +78,14 @@ fn width(sets: impl Iterator<Item = String>) -> usize {
 pub fn count(plan: &Plan, options: &Options, out: &mut dyn Write) -> Outcome {
     let generated = codegen::generate::generate_from(plan, options).map_err(generate::failure)?;
     let full = plan.with_contacts();
-    let bytes = |plan: Plan, output: Output| -> Outcome<usize> {
-        let code = Compiled::<f64>::from_plan(plan, options.clone());
-        code.and_then(|code| code.code_size(output))
-            .map_err(|e| Failure::new(e.to_string(), "count the operations without --modes"))
+    let bytes = |plan: Plan, output: Output| -> Outcome<String> {
+        match Compiled::<f64>::from_plan(plan, options.clone()).and_then(|code| code.code_size(output)) {
+            Ok(bytes) => Ok(bytes.to_string()),
+            Err(CompileError::TooLarge { .. }) => Ok("-".to_string()),
+            Err(e) => Err(Failure::new(e.to_string(), "report this, with the model")),
+        }
     };
+    let mut interpreted = false;
     let names: Vec<&str> = plan.model.contacts.iter().map(|c| c.name.as_str()).collect();
     writeln!(out, "{}: contacts {}\n", plan.model.name, names.join(", "))?;
     writeln!(out, "Operations, and bytes of machine code, in sets of modes:")?;
@@ -90,6 +93,7 @@ pub fn count(plan: &Plan, options: &Options, out: &mut dyn Write) -> Outcome {
     writeln!(out, "{:<width$}{:<24}{:>12}{:>10}", "modes", "output", "operations", "bytes")?;
     let mut line = |modes: &str, plan: &Plan, output: Output, operations: usize| -> Outcome {
         let bytes = bytes(plan.clone(), output)?;
+        interpreted |= bytes == "-";
         Ok(writeln!(out, "{modes:<width$}{:<24}{operations:>12}{bytes:>10}", output.name())?)
     };
     for (set, counts) in &generated.sets {
@@ -109,6 +113,9 @@ pub fn count(plan: &Plan, options: &Options, out: &mut dyn Write) -> Outcome {
         line(&format!("all, in {} pieces", pieces.count), pieces.operations)?;
         line("  executed where nothing touches", pieces.flight)?;
         line("  executed where everything sticks", pieces.stick)?;
+    }
+    if interpreted {
+        writeln!(out, "\n-: no machine code is made of programs that large; they are interpreted")?;
     }
     Ok(())
 }

@@ -125,6 +125,9 @@ impl Constrained for Timed {
     fn multipliers(&mut self, t: f64, q: &Vec<f64>, v: &Vec<f64>, lambda: &mut Vec<f64>) {
         self.inner.multipliers(t, q, v, lambda);
     }
+    fn row_is_early(&self, row: usize) -> bool {
+        self.inner.row_is_early(row)
+    }
     fn reorder_rows(&mut self, q: &Vec<f64>) -> bool {
         let changed = self.inner.reorder_rows(q);
         self.reordered |= changed;

@@ -393,4 +393,10 @@ pub trait Constrained: System {
     fn reorder_rows(&mut self, _q: &Self::Coordinates) -> bool {
         false
     }
+    /// Whether a row is eliminated before other freedoms of its loop, as those of legs are. Its pivot then tells whether the leg can
+    /// follow the row by itself, and not whether the mechanism can. Code generated ahead of time does not tell, and returns
+    /// `false`.
+    fn row_is_early(&self, _row: usize) -> bool {
+        false
+    }
 }

@@ -150,6 +150,9 @@ impl Constrained for Driven {
         }
         self.inner.multipliers(t, q, v, lambda);
     }
+    fn row_is_early(&self, row: usize) -> bool {
+        self.inner.row_is_early(row)
+    }
     fn reorder_rows(&mut self, q: &Vec<f64>) -> bool {
         self.inner.reorder_rows(q)
     }

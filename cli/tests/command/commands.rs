@@ -200,6 +200,18 @@ fn counts_of_loops() {
     assert!(none["outputs"][0].get("loops").is_none());
 }
 
+/// What a scene does not have costs nothing, in fast arithmetic too.
+#[test]
+fn parts_that_are_not_there_are_not_counted() {
+    for model in ["double_pendulum.toml", "chain6.toml", "panda_arm.urdf"] {
+        let model = format!("models/{model}");
+        let output = good(run(&["count", &model, "--outputs", "rates"]));
+        let text = out(&output);
+        assert!(text.contains("  gravity ") && !text.contains("external wrenches"), "{text}");
+        assert!(model.contains("panda") || !text.contains("dampers, springs"), "{text}");
+    }
+}
+
 #[test]
 fn counts() {
     let output = good(run(&["count", "models/chain6.toml", "--outputs", "all", "--json"]));

@@ -38,6 +38,22 @@ fn a_jam_is_told() {
     assert!(out(&output).contains("\njams: 1, where friction stopped"), "{}", out(&output));
 }
 
+/// The last row of the table is at the end, whatever rounding makes of the sum of the steps.
+#[test]
+fn time_steps_end_with_a_row() {
+    let folder = folder("contacts_rows");
+    for time in [0.5, 1.0, 1.5, 2.0, 3.0] {
+        let (model, text) = (shipped("block_on_incline"), time.to_string());
+        let arguments =
+            ["simulate", &model, "--time", &text, "--contacts", "stepping", "--rows", "4", "--csv", "rows.csv"];
+        good(run_in(&folder, &arguments));
+        let table = std::fs::read_to_string(folder.join("rows.csv")).expect("a table");
+        let of = |line: &str| line.split(',').next().and_then(|t| t.parse::<f64>().ok()).expect("a time");
+        let times: Vec<f64> = table.lines().skip(1).map(of).collect();
+        assert_eq!(times, [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| part * time));
+    }
+}
+
 #[test]
 fn stops_have_the_units_of_their_joints() {
     let folder = folder("contacts_stop");
@@ -383,4 +399,26 @@ fn pictures_show_what_touches_and_its_forces() {
         std::fs::read_to_string(folder.join("block_on_incline.csv")).expect("a table")
     });
     assert_eq!(tables[0], tables[1]);
+}
+
+/// Programs that are too large for machine code are counted all the same.
+#[test]
+fn large_gaps_are_counted() {
+    let folder = folder("contacts_large");
+    let body = |name: &str| format!("[[body]]\nname = \"{name}\"\nmass = 1\ninertia = [0.1, 0.1, 0.1]\n");
+    let text = format!(
+        "name = \"parts\"\n{}[[joint]]\nname = \"free\"\ntype = \"floating\"\nchild = \"a\"\nstart = [0, 0, 3, 0, 0, 0, 1]\n\
+         [[shape]]\nname = \"fixed\"\ntype = \"box\"\nsize = [1, 1, 1]\nrounding = 0.01\n\
+         [[shape]]\nname = \"moving\"\nbody = \"a\"\ntype = \"cylinder\"\nradius = 0.5\nlength = 1\nsides = 12\n\
+         [[contact]]\nname = \"both\"\nbetween = [\"fixed\", \"moving\"]\n",
+        body("a")
+    );
+    std::fs::write(folder.join("parts.toml"), text).expect("a file");
+    let output = good(run_in(&folder, &["count", "parts.toml", "--outputs", "gaps", "--modes", "masked"]));
+    let text = out(&output);
+    let row = text.lines().find(|line| line.contains(" gaps ")).unwrap_or_else(|| panic!("{text}"));
+    let words: Vec<&str> = row.split_whitespace().rev().collect();
+    let operations: u32 = words[1].parse().unwrap_or_else(|e| panic!("{e}: {row}"));
+    assert!(words[0] == "-" && operations > 30_000, "{row}");
+    assert!(text.contains("\n-: no machine code is made of programs that large"), "{text}");
 }

@@ -296,3 +296,22 @@ fn a_run_that_crawls_says_why() {
     let (code, report, messages) = simulate(&folder, &model, &[&start[..], &["--method", "rodas5p"]].concat());
     assert!(code == Some(0) && !messages.contains("hint"), "{report}{messages}");
 }
+
+/// Where nothing moves, energies are rounding errors, and measure nothing.
+#[test]
+fn rest_is_trusted() {
+    let folder = folder("trust_rest");
+    let spring = single("type = \"prismatic\"\nstiffness = 100\nrest = 0.3\nstart = 0.30000000000000004", "");
+    let model = write(&folder, "rest.toml", &format!("gravity = [0, 0, 0]\n{spring}"));
+    for more in [&["--time", "5"][..], &["--time", "5", "--step", "0.01"]] {
+        let (status, report, messages) = simulate(&folder, &model, more);
+        assert_eq!(status, Some(0), "{report}\n{messages}");
+        assert!(
+            report.contains("; the mechanism is at rest, no coordinate moves by more than ") && messages.is_empty()
+        );
+    }
+    // A motion that is short is not one at rest.
+    let moving = write(&folder, "moving.toml", &single(REVOLUTE, UPRIGHT));
+    let (_, report, _) = simulate(&folder, &moving, &["--time", "1e-10", "--v", "0.5"]);
+    assert!(!report.contains("at rest"), "{report}");
+}

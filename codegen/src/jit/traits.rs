@@ -3,6 +3,7 @@
 
 use mbd_runtime::system::{Accelerated, Conjugate, Constrained, Differentiable, Energetic};
 use mbd_runtime::system::{LieJoint, Part, Row, StateDerivatives, System};
+use mbd_runtime::tree::row_order::is_early;
 
 use super::memory::Number;
 use super::Compiled;
@@ -167,6 +168,10 @@ impl<S: Number> Constrained for Compiled<S> {
         if !self.run(Output::Multipliers, [q, v, &[]], [lambda]) {
             self.interpreting().multipliers(t, q, v, lambda);
         }
+    }
+
+    fn row_is_early(&self, row: usize) -> bool {
+        is_early(self.plan(), row)
     }
 
     /// The code is made again, where the order has changed, in place of that of this clone.

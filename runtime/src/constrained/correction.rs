@@ -175,7 +175,10 @@ where
             } else if let (Some(step), Some(before), true) = (step, last.and_then(|last| last.step), *older != zero) {
                 // The root is followed linearly over the step. Its sign changes if that leads beyond zero.
                 if root > zero && *old + (*old - *older) * (step / before) < zero {
-                    found = Some((row, t - step * (root / (root + *old))));
+                    // Where a leg cannot follow a row by itself, the mechanism may.
+                    if !system.row_is_early(row) {
+                        found = Some((row, t - step * (root / (root + *old))));
+                    }
                     root = -root;
                 }
             }

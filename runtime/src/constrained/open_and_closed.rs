@@ -77,6 +77,9 @@ impl<O, C: Constrained> Constrained for OpenAndClosed<O, C> {
     fn multipliers(&mut self, t: C::Scalar, q: &C::Coordinates, v: &C::Momenta, lambda: &mut C::Rows) {
         self.closed.multipliers(t, q, v, lambda);
     }
+    fn row_is_early(&self, row: usize) -> bool {
+        self.closed.row_is_early(row)
+    }
     fn reorder_rows(&mut self, q: &C::Coordinates) -> bool {
         self.closed.reorder_rows(q)
     }

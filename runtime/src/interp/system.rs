@@ -9,7 +9,7 @@ use super::{inputs, Interpreter};
 use crate::sweep::{Derivatives, Inputs, Sweeps};
 use crate::system::{Accelerated, Conjugate, Constrained, Differentiable, Energetic};
 use crate::system::{LieJoint, Part, Real, Row, StateDerivatives, System};
-use crate::tree::row_order::RowProducts;
+use crate::tree::row_order::{is_early, RowProducts};
 use crate::workspace::Workspace;
 use crate::Scalar;
 
@@ -105,6 +105,10 @@ impl<S: Real> Constrained for Interpreter<S> {
 
     fn multipliers(&mut self, _t: S, q: &Vec<S>, v: &Vec<S>, lambda: &mut Vec<S>) {
         self.constraint_multipliers(q, v, lambda);
+    }
+
+    fn row_is_early(&self, row: usize) -> bool {
+        is_early(&self.tree, row)
     }
 
     fn reorder_rows(&mut self, q: &Vec<S>) -> bool {

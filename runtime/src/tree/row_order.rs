@@ -137,6 +137,11 @@ pub fn early_rows(lists: &dyn RowLists) -> Vec<(usize, usize)> {
     early
 }
 
+/// Whether a row is one of the [`early_rows`].
+pub fn is_early(lists: &dyn RowLists, row: usize) -> bool {
+    early_rows(lists).iter().any(|(_, g)| lists.row(*g) == Some(row))
+}
+
 /// Has all early rows wait for the ground.
 pub fn solve_late(lists: &mut dyn RowLists) {
     for (i, g) in early_rows(lists) {

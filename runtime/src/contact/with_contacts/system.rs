@@ -101,6 +101,10 @@ impl<Y: Touching> Constrained for WithContacts<Y> {
         self.system.multipliers(t, q, v, lambda);
     }
 
+    fn row_is_early(&self, row: usize) -> bool {
+        self.system.row_is_early(row)
+    }
+
     fn reorder_rows(&mut self, q: &Y::Coordinates) -> bool {
         self.system.reorder_rows(q)
     }
