@@ -225,6 +225,7 @@ impl Observer {
 
     fn row(&mut self, t: f64, q: &[f64], p: &[f64]) {
         let v = self.velocities(q, p);
+        self.record.loads.motion(t, q, &v);
         self.record.energy.push(self.mechanism.energy(q, p));
         self.record.t.push(t);
         self.record.v.push(v);

@@ -74,7 +74,7 @@ impl Loads {
         Loads { freedoms, controlled }
     }
 
-    /// A state at the end of a step.
+    /// A state at the end of a step, or at a row within it; times do not decrease.
     pub fn motion(&mut self, t: f64, q: &[f64], v: &[f64]) {
         for (freedom, v) in self.freedoms.iter_mut().zip(v) {
             if let (Some([lower, upper]), Some(at)) = (freedom.bounds.range, freedom.coordinate) {

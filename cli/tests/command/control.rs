@@ -353,3 +353,22 @@ fn an_interrupted_run_writes_what_it_has() {
     assert!((tenths - tenths.round()).abs() > 1e-9, "{tenths}");
     assert!(read(&folder, "pendulum.svg").contains("</svg>"));
 }
+
+/// A bound that is passed within a step is told, where a row of the table shows it.
+#[test]
+fn rows_within_steps_are_looked_at_for_bounds() {
+    let folder = folder("control_within");
+    let text = "name = \"spring\"\ngravity = [0, 0, 0]\n[[body]]\nname = \"m\"\nmass = 1\n[[joint]]\nname = \"s\"\n\
+                type = \"prismatic\"\nchild = \"m\"\nstiffness = 100\nrange = [-0.4, 0.6]\nstart = 0.5\n";
+    let model = write(&folder, "spring.toml", text);
+    // A period, with steps of a quarter of it: the position is 0.5 m or 0 m at their ends, but for one of them.
+    let more = ["--time", "0.62831853", "--method", "gauss16", "--tolerance", "1e-4", "--every", "0.01"];
+    let report = run(&folder, &model, &more);
+    let rows = Rows::read(&folder, "spring.csv");
+    let (times, positions) = (rows.column("t"), rows.column("q.s"));
+    let first = times.iter().zip(&positions).find(|(_, q)| **q < -0.4).expect("a row beyond the range");
+    assert!(report.contains("positions beyond their ranges"), "{report}");
+    let told: f64 =
+        report.split("from ").nth(1).and_then(|r| r.split(' ').next()).and_then(|t| t.parse().ok()).expect("a time");
+    assert!(told <= *first.0 + 1e-3, "{report}\nfirst row {first:?}");
+}
