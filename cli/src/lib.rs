@@ -23,6 +23,7 @@ mod generate;
 mod identifiable;
 pub mod ink;
 mod interrupt;
+mod json;
 mod loops;
 mod modes;
 mod motion;

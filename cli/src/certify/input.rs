@@ -7,6 +7,7 @@ use multibody::codegen::words;
 use multibody::runtime::interval::Interval;
 use serde_json::Value;
 
+use crate::json::Unique;
 use crate::output::note;
 use crate::{source, Failure, Outcome};
 
@@ -56,7 +57,7 @@ impl Region {
 /// Reads and checks a box. All findings of the file are reported at once.
 pub fn read(path: &Path, plan: &Plan) -> Outcome<Region> {
     let (name, text) = source::json(path)?;
-    let value: Value = serde_json::from_str(&text)
+    let Unique(value) = serde_json::from_str(&text)
         .map_err(|e| Failure::new(format!("{name}:{}:{}: not JSON: {e}", e.line(), e.column()), SHAPE))?;
     let Value::Object(object) = &value else {
         return Err(Failure::new(format!("{name}: not an object"), SHAPE));

@@ -7,6 +7,7 @@ use multibody::runtime::Interpreter;
 use serde_json::{Map, Value};
 
 use super::outer::{Outer, Unit};
+use crate::json::Unique;
 use crate::verdict::UNIT;
 
 /// The contents of the file.
@@ -67,7 +68,7 @@ const SHAPE: &str = "write {\"states\": [{\"q\": [..], \"v\": [..], \"tau\": [..
 
 /// Parses the text.
 pub fn read(text: &str, plan: &Plan, outer: &Outer) -> Result<Inputs, Vec<Finding>> {
-    let value: Value = serde_json::from_str(text).map_err(|e| {
+    let Unique(value) = serde_json::from_str(text).map_err(|e| {
         let what = e.to_string();
         let what = what.split(" at line ").next().unwrap_or(&what).to_string();
         vec![(format!(":{}:{}", e.line(), e.column()), what, "correct the JSON".to_string())]

@@ -98,6 +98,8 @@ fn eval_says_what_is_wrong() {
     };
     let pendulum = "models/double_pendulum.toml";
     eval(pendulum, "{\"states\": [}", &["in.json:1:13: error: expected value"]);
+    let twice = "{\"q\": [0, 0],\n \"v\": [0, 0], \"v\": [1, 1]}";
+    eval(pendulum, twice, &["in.json:2:17: error: the key `v` stands twice in one object"]);
     eval(pendulum, "[]", &["the file: error: not an object"]);
     eval(pendulum, "{\"state\": []}", &["unknown key `state`", "did you mean `states`?", "states: error: no list"]);
     let two = r#"{"states": [{"q": [0, 0], "v": [0, 0]}, {"q": [0], "v": [0, "a"], "tua": []}]}"#;
