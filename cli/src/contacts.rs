@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use multibody::codegen::jit::Compiled;
-use multibody::codegen::model::ConstraintKind;
+use multibody::codegen::model::{ConstraintKind, ShapeKind};
 use multibody::codegen::plan::Plan;
 use multibody::codegen::words::quote;
 use multibody::codegen::{Arithmetic, Options};
@@ -306,11 +306,31 @@ fn failure(plan: &Plan, error: &HybridError) -> Failure {
             format!("the bodies of contact `{}` overlap by {:.3e} at the start", name(plan, *contact), -gap),
             "give --q with a position where they are apart or touch",
         ),
-        other => Failure::new(
-            format!("the simulation failed: {other}{}", named(plan, other)),
-            "a smaller --tolerance, or a shorter --time, shows what came before; nothing was written",
-        ),
+        other => {
+            let help = "a smaller --tolerance, or a shorter --time, shows what came before; nothing was written";
+            let help = match cylinder_on_plane(plan) {
+                Some(name) => format!(
+                    "if cylinder {} stands upright on a plane there, it has no lowest point: give it corners, as a box or hull, or points; \
+                     otherwise {help}",
+                    quote(name)
+                ),
+                None => help.to_string(),
+            };
+            Failure::new(format!("the simulation failed: {other}{}", named(plan, other)), help)
+        }
     }
+}
+
+/// The first cylinder that can stand on a plane.
+fn cylinder_on_plane(plan: &Plan) -> Option<&str> {
+    let shapes = &plan.model.shapes;
+    let pairs = plan.model.contacts.iter().filter_map(|contact| contact.shapes);
+    let ordered = pairs.flat_map(|[a, b]| [[a, b], [b, a]]).map(|pair| pair.map(|k| &shapes[k]));
+    let mut cylinders = ordered.filter_map(|[ground, shape]| match (&ground.kind, &shape.kind) {
+        (ShapeKind::Plane { .. }, ShapeKind::Cylinder { length, .. }) if *length > 0.0 => Some(shape.name.as_str()),
+        _ => None,
+    });
+    cylinders.next()
 }
 
 /// The failure of a start where a joint stands beyond its stop, with all joints that do.

@@ -422,3 +422,23 @@ fn large_gaps_are_counted() {
     assert!(words[0] == "-" && operations > 30_000, "{row}");
     assert!(text.contains("\n-: no machine code is made of programs that large"), "{text}");
 }
+
+/// A cylinder that stands upright has no lowest point, which the message of the failure says.
+#[test]
+fn upright_cylinders_are_told() {
+    let folder = folder("contacts_upright");
+    let can = "name = \"can\"\ngravity = [0.5, 0.2, -9.81]\n[contacts]\nfriction = 0.4\nrestitution = 0.3\npairs = \"all\"\n\
+               [[body]]\nname = \"can\"\nmass = 2\ninertia = [0.01, 0.01, 0.006]\n\
+               [[joint]]\nname = \"free\"\ntype = \"floating\"\nchild = \"can\"\nstart = [0.05, 0.02, 0.15, 0, 0, 0, 1]\n\
+               [[shape]]\nname = \"floor\"\ntype = \"plane\"\n\
+               [[shape]]\nname = \"tin\"\nbody = \"can\"\ntype = \"cylinder\"\nradius = 0.1\nlength = 0.3\n";
+    std::fs::write(folder.join("can.toml"), can).expect("a file");
+    bad(
+        run_in(&folder, &["simulate", "can.toml", "--time", "0.1"]),
+        &[
+            "the simulation failed: ",
+            "if cylinder `tin` stands upright on a plane there, it has no lowest point: give it corners",
+        ],
+    );
+    assert_eq!(files(&folder), ["can.toml"]);
+}
