@@ -194,6 +194,15 @@ fn joint_forces_cost_one_addition_each_at_most() {
     }
 }
 
+/// Counts the operations of derivatives in fast arithmetic.
+#[track_caller]
+fn check_derivatives(name: &str, model: &Model, output: Output, limit: usize) {
+    let plan = search::plan(model, PlanOptions::default());
+    let count = trace(&plan, output, &Options::default()).expect("derivatives").program.counts().total();
+    println!("{name}: {count}");
+    assert!(count <= limit, "{name}: {count} operations, at most {limit}");
+}
+
 /// Counts for the derivatives of mechanisms with constraints. The comments give those of dual numbers through the rates, once
 /// for each direction.
 #[test]
@@ -210,11 +219,7 @@ fn derivatives_of_loops_stay_below_their_limits() {
         ("stewart", 60000),        // 139472
     ] {
         let model = file(&format!("mechanisms/{name}.toml"), Base::Fixed, None);
-        let plan = search::plan(&model, PlanOptions::default());
-        let program = trace(&plan, Output::Derivatives, &Options::default()).expect("derivatives").program;
-        let count = program.counts().total();
-        println!("{name}: {count}");
-        assert!(count <= limit, "{name}: {count} operations, at most {limit}");
+        check_derivatives(name, &model, Output::Derivatives, limit);
     }
 }
 
@@ -235,11 +240,7 @@ fn parameter_derivatives_of_loops_stay_below_their_limits() {
             model.params.push(Param { name: format!("m{k}"), default });
             body.mass = Value::Param(k);
         }
-        let plan = search::plan(&model, PlanOptions::default());
-        let program = trace(&plan, Output::ParameterDerivatives, &Options::default()).expect("derivatives").program;
-        let count = program.counts().total();
-        println!("{name}: {count}");
-        assert!(count <= limit, "{name}: {count} operations, at most {limit}");
+        check_derivatives(name, &model, Output::ParameterDerivatives, limit);
     }
 }
 
@@ -259,10 +260,6 @@ fn derivatives_stay_below_their_limits() {
         ("g1.urdf", Base::Floating, 56500),
     ] {
         let model = self::file(file, base, None);
-        let plan = search::plan(&model, PlanOptions::default());
-        let program = trace(&plan, Output::Derivatives, &Options::default()).expect("derivatives").program;
-        let count = program.counts().total();
-        println!("{file}: {count}");
-        assert!(count <= limit, "{file}: {count} operations, at most {limit}");
+        check_derivatives(file, &model, Output::Derivatives, limit);
     }
 }

@@ -1,6 +1,6 @@
 //! The command on models with contacts: the table of events, and what is refused.
 
-use crate::run::{bad, files, folder, good, out, run_in, ROOT};
+use crate::run::{bad, files, folder, good, out, run_in, Rows, ROOT};
 
 fn shipped(name: &str) -> String {
     format!("{ROOT}/models/contacts/{name}.toml")
@@ -47,9 +47,7 @@ fn time_steps_end_with_a_row() {
         let arguments =
             ["simulate", &model, "--time", &text, "--contacts", "stepping", "--rows", "4", "--csv", "rows.csv"];
         good(run_in(&folder, &arguments));
-        let table = std::fs::read_to_string(folder.join("rows.csv")).expect("a table");
-        let of = |line: &str| line.split(',').next().and_then(|t| t.parse::<f64>().ok()).expect("a time");
-        let times: Vec<f64> = table.lines().skip(1).map(of).collect();
+        let times = Rows::read(&folder, "rows.csv").column("t");
         assert_eq!(times, [0.0, 0.25, 0.5, 0.75, 1.0].map(|part| part * time));
     }
 }

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use crate::run::{bad, files, folder, good, out, read, run_in, write, ROOT};
+use crate::run::{bad, files, folder, good, out, read, run_in, write, Rows, ROOT};
 
 /// A bar of 1 m and 2 kg that hangs down, with its hinge at the origin.
 const PENDULUM: &str = r#"
@@ -43,31 +43,6 @@ type = "prismatic"
 child = "block"
 axis = [1, 0, 0]
 "#;
-
-/// A table as columns by name.
-struct Rows {
-    header: Vec<String>,
-    rows: Vec<Vec<f64>>,
-}
-
-impl Rows {
-    fn read(folder: &Path, name: &str) -> Rows {
-        let text = read(folder, name);
-        let mut lines = text.lines();
-        let header = lines.next().expect("a header").split(',').map(String::from).collect();
-        let numbers = |line: &str| line.split(',').map(|x| x.parse().expect("a number")).collect();
-        Rows { header, rows: lines.map(numbers).collect() }
-    }
-
-    fn column(&self, name: &str) -> Vec<f64> {
-        let at = self.header.iter().position(|n| n == name).unwrap_or_else(|| panic!("{name}: {:?}", self.header));
-        self.rows.iter().map(|row| row[at]).collect()
-    }
-
-    fn last(&self, name: &str) -> f64 {
-        *self.column(name).last().expect("a row")
-    }
-}
 
 fn close(a: f64, b: f64, tolerance: f64) {
     assert!((a - b).abs() <= tolerance, "{a} and {b} differ by {:.1e}", (a - b).abs());

@@ -1,6 +1,6 @@
 //! The command on models with loops: closing, messages about loops that do not close, simulation, pictures, evaluation.
 
-use crate::run::{bad, err, files, folder, good, out, run, run_in, ROOT};
+use crate::run::{bad, err, files, folder, good, number, out, run, run_in, Rows, ROOT};
 use serde_json::Value;
 
 const FOURBAR: &str = include_str!("../../../models/mechanisms/fourbar.toml");
@@ -155,11 +155,6 @@ fn evaluates() {
 fn the_table_of_mechanisms_is_what_is_printed() {
     let folder = folder("loops_table");
     let page = include_str!("../../../book/src/mechanisms.md");
-    let after = |text: &str, what: &str| -> f64 {
-        let rest = text.split(what).nth(1).unwrap_or_else(|| panic!("{what}: {text}"));
-        let end = rest.find(|c: char| !c.is_ascii_digit() && !"e-.".contains(c)).unwrap_or(rest.len());
-        rest[..end].parse().unwrap_or_else(|e| panic!("{what}: {e}: {text}"))
-    };
     let mut rows = 0;
     for row in page.lines().filter(|line| line.starts_with("| `")) {
         let cells: Vec<&str> = row.split('|').map(str::trim).collect();
@@ -178,7 +173,7 @@ fn the_table_of_mechanisms_is_what_is_printed() {
             "{row}\n{text}"
         );
         for (what, told) in [("energy error: at most ", energy), ("loops open by up to ", drift)] {
-            let (found, told) = (after(text, what), told.parse::<f64>().expect("a number"));
+            let (found, told) = (number(text, what), told.parse::<f64>().expect("a number"));
             assert!(found < 3.0 * told && told < 3.0 * found, "{name}: {what}{found:e}, in the book {told:e}");
         }
         rows += 1;
@@ -234,11 +229,7 @@ fn a_straight_knee_is_not_a_singular_position() {
             &folder,
             &[&["simulate", "knee.toml", "--time", "3", "--tolerance", tolerance], &start[..]].concat(),
         ));
-        let table = std::fs::read_to_string(folder.join("knee.csv")).expect("a table");
-        let column =
-            table.lines().next().expect("a header").split(',').position(|name| name == "q.knee").expect("the knee");
-        let of = |row: &str| row.split(',').nth(column).expect("a number").parse::<f64>().expect("a number");
-        let knee: Vec<f64> = table.lines().skip(1).map(of).collect();
+        let knee = Rows::read(&folder, "knee.csv").column("q.knee");
         assert!(knee.windows(2).any(|pair| pair[0] * pair[1] < 0.0), "the knee does not become straight");
         assert!(!out(&output).contains("singular"), "{}", out(&output));
     }

@@ -148,3 +148,36 @@ pub fn is_there(program: &str) -> bool {
     }
     there
 }
+
+/// The number behind a text.
+#[track_caller]
+pub fn number(report: &str, before: &str) -> f64 {
+    let rest = report.split(before).nth(1).unwrap_or_else(|| panic!("`{before}` is not in:\n{report}"));
+    let end = rest.find(|c: char| !(c.is_ascii_digit() || ".e-".contains(c))).unwrap_or(rest.len());
+    rest[..end].parse().unwrap_or_else(|_| panic!("no number behind `{before}` in:\n{report}"))
+}
+
+/// A table as columns by name.
+pub struct Rows {
+    pub header: Vec<String>,
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl Rows {
+    pub fn read(folder: &Path, name: &str) -> Rows {
+        let text = read(folder, name);
+        let mut lines = text.lines();
+        let header = lines.next().expect("a header").split(',').map(String::from).collect();
+        let numbers = |line: &str| line.split(',').map(|x| x.parse().expect("a number")).collect();
+        Rows { header, rows: lines.map(numbers).collect() }
+    }
+
+    pub fn column(&self, name: &str) -> Vec<f64> {
+        let at = self.header.iter().position(|n| n == name).unwrap_or_else(|| panic!("{name}: {:?}", self.header));
+        self.rows.iter().map(|row| row[at]).collect()
+    }
+
+    pub fn last(&self, name: &str) -> f64 {
+        *self.column(name).last().expect("a row")
+    }
+}

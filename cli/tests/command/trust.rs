@@ -25,14 +25,6 @@ fn simulate(folder: &Path, model: &str, more: &[&str]) -> (Option<i32>, String, 
     (output.status.code(), out(&output).to_string(), err(&output).to_string())
 }
 
-/// The number behind a text.
-#[track_caller]
-fn number(report: &str, before: &str) -> f64 {
-    let rest = report.split(before).nth(1).unwrap_or_else(|| panic!("`{before}` is not in:\n{report}"));
-    let end = rest.find(|c: char| !(c.is_ascii_digit() || ".e-".contains(c))).unwrap_or(rest.len());
-    rest[..end].parse().unwrap_or_else(|_| panic!("no number behind `{before}` in:\n{report}"))
-}
-
 /// The last row of the table.
 fn end(folder: &Path) -> Vec<f64> {
     let table = read(folder, "a.csv");
